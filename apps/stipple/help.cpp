@@ -146,7 +146,7 @@ void arrangeOptions(CLI::App& command) {
                       "--colour-range", "--legend",   "--environment", "--environment-scale",
                       "--sun",          "--sun-size", "--refract",     "--wind",
                       "--time",         "--debug",    "--effects",     "--set",
-                      "--opacity"});
+                      "--opacity",      "--transfer"});
     group("Inputs that are not built yet",
           {"--memory", "--temp", "--duplicates", "--threads", "--normals", "--radii", "--up", "--attributes",
            "--surfels", "--curve-radius", "--only-points", "--skip-bad", "--drop-outliers", "--allow-outside",

@@ -38,7 +38,7 @@ struct Options {
     std::vector<std::string> inputs;
     std::string output, size = "1280x720", device = "auto", shade = "auto",
                         background = fmt::format("{}", fmt::join(render::kBackground, ","));
-    std::string debug = "none", resident = "1G";
+    std::string debug = "none", resident = "1G", transfer = "srgb";
     double error = 1, curveExact = 2, wind = 0, seconds = 0;
     ModeOptions drawn;
     int frames = 1, samples = 4;
@@ -68,6 +68,10 @@ Result<glm::dvec3> backgroundOf(const Options& o) {
     return background;
 }
 
+image::PictureFormat formatOf(const Options& o) {
+    return {o.alpha, o.transfer == "rec709" ? image::Transfer::rec709 : image::Transfer::srgb};
+}
+
 /// What can be found out before a scene is built, which may take hours.
 Result<void> checkArguments(const Options& o) {
     STIPPLE_TRY(o.camera.check());
@@ -80,6 +84,9 @@ Result<void> checkArguments(const Options& o) {
                     "leave out --target-ms and --target-error");
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     STIPPLE_TRY(backgroundOf(o));
+    if (o.transfer == "rec709" && std::filesystem::path(o.output).extension() != ".png")
+        return fail(ErrorKind::usage, "only a .png has colours that are encoded; an .exr has light itself",
+                    "--transfer rec709", "leave it out, or write a .png");
     if (parseBytes(o.resident) == 0)
         return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
     for (const std::string& file : {o.camera.path, o.environment.path})
@@ -202,7 +209,7 @@ Result<void> runTraced(const Options& o, const OpenedScene& scene, const Shot& s
         const bool isEmpty = showsNothing(traced);
         empty += isEmpty ? 1 : 0;
         drawLegend(legend, traced);
-        STIPPLE_TRY(image::writePicture(name, traced, o.alpha));
+        STIPPLE_TRY(image::writePicture(name, traced, formatOf(o)));
         ++written.pictures;
         frames.push_back(1e3 * seconds);
         pictures.push_back({{"path", name}, {"seconds", seconds}, {"shows_nothing", isEmpty}});
@@ -365,15 +372,16 @@ Result<void> run(const Options& o, Written& written) {
         settings.budgets.errorPixels = c.errorPixels;
         if (!o.quiet && !o.json) fmt::print("{}\n", c.text);
     }
-    const FramesPlan plan{&shot,           o.output, o.resident,          o.frames, exposure, executor.get(), o.noWait,
-                          o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha,  &legend};
+    const FramesPlan plan{&shot,          o.output, o.resident,      o.frames, exposure,
+                          executor.get(), o.noWait, o.build.skipBad, o.quiet,  !o.quiet && !o.json,
+                          formatOf(o),    &legend};
     Timings timings;
     Verdict verdict;
     STIPPLE_TRY(runFrames(plan, settings, *state, timings, written, verdict));
     if (shot.views.size() == 1) {
         STIPPLE_TRY(checkStopped(o.output));
         drawLegend(legend, state->image);
-        STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
+        STIPPLE_TRY(image::writePicture(o.output, state->image, formatOf(o)));
     }
     tell(o, *state, settings.draw, verdict, timings, size, shot.views.size());
     if (!o.quiet) sayShadows(*state);
@@ -468,6 +476,9 @@ void setupRender(CLI::App& app, int& status) {
             ->capture_default_str();
     sub->add_flag("--alpha", o->alpha, "no background: how much of a pixel is covered goes into the alpha channel")
         ->excludes(background);
+    sub->add_option("--transfer", o->transfer, "how colours of a .png are encoded, which it says itself")
+        ->check(oneOf({"srgb", "rec709"}))
+        ->capture_default_str();
     sub->add_option("--debug", o->debug, "draw what the engine did instead of colours")
         ->check(oneOf({"none", "level", "error", "holes", "normals"}))
         ->capture_default_str();

@@ -177,7 +177,7 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
         STIPPLE_TRY(accumulate(plan, i, frame, state, verdict));
         if (isSingle) break;
         if (plan.legend) drawLegend(*plan.legend, state.image);
-        STIPPLE_TRY(image::writePicture(numbered(plan.output, i), state.image, plan.alpha));
+        STIPPLE_TRY(image::writePicture(numbered(plan.output, i), state.image, plan.format));
         ++written.pictures;
         if (plan.printNames) fmt::print("{}\n", numbered(plan.output, i));
     }

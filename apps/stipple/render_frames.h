@@ -7,6 +7,7 @@
 
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/legend.h"
+#include "engine/image/coverage.h"
 #include "engine/render/accumulation.h"
 #include "engine/render/frame.h"
 #include "engine/render/pruning.h"
@@ -20,7 +21,8 @@ struct FramesPlan {
     int repeats = 1;               ///< of a single view, for timing
     render::Exposure exposure;
     Executor* executor = nullptr;
-    bool noWait = false, skipBad = false, quiet = false, printNames = false, alpha = false;
+    bool noWait = false, skipBad = false, quiet = false, printNames = false;
+    image::PictureFormat format{};
     const Legend* legend = nullptr;  ///< that pictures of a path get
 };
 

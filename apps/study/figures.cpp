@@ -276,7 +276,7 @@ Result<void> writeFigure(const FigureTools& tools, const Figure& figure, const P
     }
     if (!panels) return tl::unexpected(panels.error());
     Image sheet = sideBySide(*panels);
-    STIPPLE_TRY(image::writePicture(tools.folder + "/../" + figure.file, sheet, false));
+    STIPPLE_TRY(image::writePicture(tools.folder + "/../" + figure.file, sheet, {}));
     out.push_back(figure);
     return {};
 }

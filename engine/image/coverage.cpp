@@ -31,12 +31,12 @@ void separateCoverage(render::Image& image) {
     }
 }
 
-Result<void> writePicture(const std::string& path, render::Image& image, bool hasAlpha) {
-    if (hasAlpha)
+Result<void> writePicture(const std::string& path, render::Image& image, const PictureFormat& format) {
+    if (format.hasAlpha)
         separateCoverage(image);
     else
         makeOpaque(image);
-    return writeImage(path, image);
+    return writeImage(path, image, format.transfer);
 }
 
 }  // namespace stipple::image

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "engine/base/result.h"
+#include "engine/image/transfer.h"
 #include "engine/render/backend.h"
 
 namespace stipple::image {
@@ -14,7 +15,11 @@ void makeOpaque(render::Image& image);
 /// multiplied with it, as EXR wants it.
 void separateCoverage(render::Image& image);
 
-/// Writes a picture: opaque, or `hasAlpha` with its coverage (then it must have been drawn on black).
-Result<void> writePicture(const std::string& path, render::Image& image, bool hasAlpha);
+struct PictureFormat {
+    bool hasAlpha = false;  ///< with its coverage; the picture must have been drawn on black. Otherwise: opaque
+    Transfer transfer = Transfer::srgb;  ///< of PNG; EXR has light itself
+};
+/// Writes a picture, whose colours are separated from its coverage, or which gets its background, on the way.
+Result<void> writePicture(const std::string& path, render::Image& image, const PictureFormat& format);
 
 }  // namespace stipple::image

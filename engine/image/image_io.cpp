@@ -99,9 +99,16 @@ Result<void> checkImagePath(const std::string& path) {
     return fail(ErrorKind::usage, "pictures are written as .png or .exr", path, "change the extension");
 }
 
-Result<std::vector<char>> encodeImage(const std::string& path, const render::Image& image) {
+Result<std::vector<char>> encodeImage(const std::string& path, const render::Image& image, Transfer transfer) {
     STIPPLE_TRY(checkImagePath(path));
     const bool isExr = hasExtension(path, ".exr");
+    if (!isExr && transfer == Transfer::rec709) {
+        render::Image encoded{image.width, image.height, image.rgba};
+        encodeRec709(encoded);
+        STIPPLE_ASSIGN(std::vector<char> bytes, encodeImage(path, encoded, Transfer::srgb));
+        tagRec709(bytes);
+        return bytes;
+    }
     const size_t pixels = size_t{image.width} * image.height;
     std::vector<float> wide;
     if (isExr) {
@@ -134,8 +141,8 @@ Result<std::vector<char>> encodeImage(const std::string& path, const render::Ima
     return bytes;
 }
 
-Result<void> writeImage(const std::string& path, const render::Image& image) {
-    STIPPLE_ASSIGN(const std::vector<char> bytes, encodeImage(path, image));
+Result<void> writeImage(const std::string& path, const render::Image& image, Transfer transfer) {
+    STIPPLE_ASSIGN(const std::vector<char> bytes, encodeImage(path, image, transfer));
     return writeWholeFile(path, bytes.data(), bytes.size());
 }
 

@@ -5,15 +5,18 @@
 #include <vector>
 
 #include "engine/base/result.h"
+#include "engine/image/transfer.h"
 #include "engine/render/backend.h"
 
 namespace stipple::image {
 
 /// By extension: .png (8 bit) or .exr (linear colour, depth, normal), both with the image's alpha as it is (see
 /// coverage.h). Whole or not at all.
-Result<void> writeImage(const std::string& path, const render::Image& image);
+/// `transfer`: of PNG, whose colours are encoded so here, from sRGB, and said to be.
+Result<void> writeImage(const std::string& path, const render::Image& image, Transfer transfer = Transfer::srgb);
 /// The bytes that writeImage would write to `path`.
-Result<std::vector<char>> encodeImage(const std::string& path, const render::Image& image);
+Result<std::vector<char>> encodeImage(const std::string& path, const render::Image& image,
+                                      Transfer transfer = Transfer::srgb);
 /// Memory that reading a picture may take, where nobody says. The size that a picture claims is checked against it, and
 /// against the bytes that are there, before anything is allocated.
 constexpr uint64_t kPictureMemory = uint64_t{4} << 30;

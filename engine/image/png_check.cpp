@@ -8,12 +8,8 @@
 #include <vector>
 
 namespace stipple::image {
-namespace {
 
-constexpr uint64_t kSignature = 8, kAround = 12;  ///< bytes: of the file; length, type and checksum of a chunk
-
-/// CRC-32 as in PNG, annex D.
-uint32_t crcOf(uint32_t crc, const uint8_t* bytes, size_t count) {
+uint32_t crcOfPng(uint32_t crc, const uint8_t* bytes, size_t count) {
     static const auto table = [] {
         std::array<uint32_t, 256> t{};
         for (uint32_t n = 0; n < 256; ++n) {
@@ -26,6 +22,10 @@ uint32_t crcOf(uint32_t crc, const uint8_t* bytes, size_t count) {
     for (size_t i = 0; i < count; ++i) crc = table[(crc ^ bytes[i]) & 255u] ^ crc >> 8;
     return crc;
 }
+
+namespace {
+
+constexpr uint64_t kSignature = 8, kAround = 12;  ///< bytes: of the file; length, type and checksum of a chunk
 
 uint32_t word(const uint8_t* b) {
     return static_cast<uint32_t>(b[0]) << 24 | static_cast<uint32_t>(b[1]) << 16 | static_cast<uint32_t>(b[2]) << 8 |
@@ -48,11 +48,11 @@ Result<std::string> faultOfPng(uint64_t bytes, const ReadAt& readAt, bool wholly
         if (!wholly && type == "IDAT") return std::string();
         if (length > bytes - at - kAround)
             return fmt::format("ends after {} bytes, in the middle of the picture", bytes);
-        uint32_t crc = crcOf(~0u, head.data() + 4, 4);
+        uint32_t crc = crcOfPng(~0u, head.data() + 4, 4);
         for (uint64_t done = 0; done < length;) {
             const auto count = static_cast<size_t>(std::min<uint64_t>(buffer.size(), length - done));
             STIPPLE_TRY(readAt(at + 8 + done, buffer.data(), count));
-            crc = crcOf(crc, buffer.data(), count);
+            crc = crcOfPng(crc, buffer.data(), count);
             done += count;
         }
         std::array<uint8_t, 4> sum{};

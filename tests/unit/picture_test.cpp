@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -131,6 +132,66 @@ TEST_F(Picture, CoverageIsKeptApartFromColour) {
     EXPECT_EQ(image.rgba[2], 0x800000ffu) << "half covered by full red";
     image::makeOpaque(opaque);
     EXPECT_EQ(opaque.rgba[2], 0xff000080u);
+}
+
+/// The chunks of a PNG by name, in order, with their checksums as they should be (bit by bit: PNG, annex D).
+std::vector<std::pair<std::string, std::string>> chunksOf(const std::string& png) {
+    std::vector<std::pair<std::string, std::string>> out;
+    const auto word = [&](size_t at) {
+        uint32_t w = 0;
+        for (size_t i = 0; i < 4; ++i) w = w << 8 | static_cast<uint8_t>(png.at(at + i));
+        return w;
+    };
+    for (size_t at = 8; at < png.size();) {
+        const size_t length = word(at);
+        uint32_t crc = ~0u;
+        for (size_t i = at + 4; i < at + 8 + length; ++i) {
+            crc ^= static_cast<uint8_t>(png.at(i));
+            for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ ((crc & 1u) != 0 ? 0xedb88320u : 0u);
+        }
+        EXPECT_EQ(~crc, word(at + 8 + length)) << png.substr(at + 4, 4);
+        out.emplace_back(png.substr(at + 4, 4), png.substr(at + 8, length));
+        at += 12 + length;
+    }
+    return out;
+}
+
+TEST_F(Picture, SaysThatItIsOfBt709WhereItIs) {
+    writeBall("ball.ply");
+    const std::string how = "render ball.ply --quiet --size 96x64 --device cpu --background 0,128,255 ";
+    ASSERT_EQ(run(how + "-o a.png --transfer rec709"), 0) << said_;
+    ASSERT_EQ(run(how + "-o s.png"), 0) << said_;
+    ASSERT_EQ(run(how + "-o a.exr"), 0) << said_;
+    const auto encoded = image::readImage(folder_ / "a.png"), srgb = image::readImage(folder_ / "s.png");
+    const auto light = image::readHdr(folder_ / "a.exr");
+    ASSERT_TRUE(encoded && srgb && light);
+    // What the light of each pixel is in BT.709, item 1.2, against the byte; sRGB is another.
+    double worst = 0, control = 0;
+    for (size_t i = 0; i < encoded->rgba.size(); ++i)
+        for (size_t c = 0; c < 3; ++c) {
+            const double l = std::clamp(double{light->rgb[3 * i + c]}, 0.0, 1.0);
+            const double value = 255 * (l < 0.018 ? 4.5 * l : 1.099 * std::pow(l, 0.45) - 0.099);
+            worst = std::max(worst, std::abs(value - static_cast<double>(encoded->rgba[i] >> (8 * c) & 255u)));
+            control = std::max(control, std::abs(value - static_cast<double>(srgb->rgba[i] >> (8 * c) & 255u)));
+        }
+    EXPECT_LE(worst, 1.07);
+    EXPECT_GT(control, 10) << "the control";
+    std::map<std::string, std::string> chunks;
+    bool isBeforePixels = true;
+    for (const auto& [name, bytes] : chunksOf(test::slurp(folder_ / "a.png"))) {
+        if (name == "IDAT") isBeforePixels = chunks.count("cICP") == 1;
+        chunks[name] = bytes;
+    }
+    EXPECT_TRUE(isBeforePixels);
+    EXPECT_EQ(chunks["cICP"], std::string("\1\1\0\1", 4));
+    EXPECT_EQ(chunks.count("sRGB"), 0u);
+    EXPECT_EQ(chunks["gAMA"], std::string("\0\0\xcb\x73", 4));
+    std::set<std::string> plain;
+    for (const auto& [name, bytes] : chunksOf(test::slurp(folder_ / "s.png"))) plain.insert(name);
+    EXPECT_TRUE(plain.contains("sRGB") && !plain.contains("cICP"));
+    EXPECT_EQ(run(how + "-o b.exr --transfer rec709"), 2);
+    EXPECT_NE(said_.find("--transfer rec709"), std::string::npos) << said_;
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "b.exr"));
 }
 
 TEST_F(Picture, AScanWithoutColoursShowsItsHeightAndItsShape) {
