@@ -49,6 +49,7 @@ Result<void> run(const Options& o, bool& isSilent) {
         const auto cores = static_cast<int>(std::thread::hardware_concurrency());
         if (build.threads == 0) build.threads = std::max(cores / job.onThisMachine, 1);
     }
+    if (!o.quiet && !isSilent) build.say = printLine;
     if (o.restart) build.leftovers = lod::Leftovers::replace;
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     STIPPLE_TRY(agree(build.ranks,
@@ -57,9 +58,9 @@ Result<void> run(const Options& o, bool& isSilent) {
     keepFreeMemory(settings.memoryBytes, threads);
     const auto executor = makeTbbExecutor(build.threads);
     Result<lod::BuildReport> built = [&] {
-        Progress progress(build.progressStyle(o.quiet || isSilent));
+        Progress progress(build.styleOf(o.quiet || isSilent));
         if (build.patches.isAsked) return buildPatches(o.inputs, o.output, build, *executor, progress);
-        return buildAny(o.inputs, o.output, build, *executor, progress);
+        return scene::buildAny(o.inputs, o.output, build, *executor, progress);
     }();
     if (!built && built.error().kind == ErrorKind::interrupted) built = tl::unexpected(interruptedAt(built.error(), o));
     if (!built) return tl::unexpected(built.error());

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/stipple/ply_meshes.h"
 #include "engine/base/hash.h"
 #include "engine/base/words.h"
+#include "engine/scene/open/ply_meshes.h"
 #include "engine/scene/place_looks.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/patch_store/patch_store_build.h"
@@ -97,7 +97,7 @@ struct Looks {
 Result<Looks> looksOf(const scene::Scene& scene, const scene::MaterialList& materials, uint64_t memoryBytes) {
     Looks out;
     if (!scene::hasTextures(scene) && materials.list.size() < 2) return out;
-    STIPPLE_ASSIGN(out.images, decodeImages(scene, memoryBytes));
+    STIPPLE_ASSIGN(out.images, scene::decodeImages(scene, memoryBytes, printLine));
     for (const scene::DecodedImage& image : out.images) {
         const uint64_t bytes = image.rgba.size() * sizeof(uint32_t);
         out.imageBytes += bytes;
@@ -159,7 +159,7 @@ Result<lod::TriangleMesh> collect(const lod::MeshSource& source) {
 Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::ReadSettings& reading) {
     lod::MeshSource source;
     scene::Scene scene;
-    if (isSceneFile(input)) {
+    if (scene::isSceneFile(input)) {
         STIPPLE_ASSIGN(scene, scene::readScene(input, reading));
         source = scene::triangleSource(scene, scene::placements(scene));
     } else {
@@ -171,7 +171,7 @@ Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::R
 }
 
 bool hasTriangles(const std::string& input) {
-    if (isSceneFile(input)) return true;
+    if (scene::isSceneFile(input)) return true;
     const auto faces = lod::plyFaces(input);
     return faces && faces->any();
 }
@@ -180,7 +180,7 @@ Result<std::vector<glm::dvec3>> readPlaces(const std::string& input, const scene
     std::vector<glm::dvec3> all;
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs({input}, nullptr));
     for (const std::string& file : files) {
-        STIPPLE_ASSIGN(const lod::PointSource source, openInput(file, {}, 0, reading));
+        STIPPLE_ASSIGN(const lod::PointSource source, scene::openInput(file, {}, 0, reading, printLine));
         STIPPLE_TRY(lod::readPoints(source, [&](const lod::PointBlock& block) -> Result<void> {
             all.insert(all.end(), block.position.begin(), block.position.end());
             for (const glm::ivec3& p : block.lattice)
@@ -229,12 +229,12 @@ Result<lod::BuildReport> buildPatches(const std::vector<std::string>& inputs, co
     if (build.surfels > 0 || build.surfelWeights)
         return fail(ErrorKind::usage, "is of surfaces", "--patches with --surfels or --surfel-weights",
                     "leave one of them out");
-    if (isSceneFile(inputs.front())) {
+    if (scene::isSceneFile(inputs.front())) {
         if (inputs.size() > 1)
             return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
         return ofScene(inputs.front(), output, build, executor, progress);
     }
-    STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
+    STIPPLE_ASSIGN(const scene::PlyMeshes meshes, scene::findPlyMeshes(inputs, build));
     if (!meshes.areAll()) return ofScans(inputs, output, build, executor, progress);
     STIPPLE_ASSIGN(lod::BuildReport report, ofPly(meshes.files, output, build, executor, progress));
     report.notes.insert(report.notes.begin(), meshes.notes.begin(), meshes.notes.end());

@@ -4,11 +4,11 @@
 #include <ctime>
 #include <filesystem>
 
-#include "apps/stipple/cache_folder.h"
 #include "apps/stipple/common.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
+#include "engine/scene/open/cache_folder.h"
 
 namespace stipple::app {
 namespace {
@@ -43,7 +43,7 @@ std::string isoTime(Clock::time_point t) {
 
 std::string scenes(size_t count) { return fmt::format("{} scene{}", count, count == 1 ? "" : "s"); }
 
-std::string inputText(const CacheEntry& entry) {
+std::string inputText(const scene::CacheEntry& entry) {
     if (!entry.record || entry.record->inputs.empty()) return "not recorded";
     const std::vector<std::string>& inputs = entry.record->inputs;
     const std::string more = inputs.size() > 1 ? fmt::format(" and {} more", inputs.size() - 1) : "";
@@ -51,7 +51,7 @@ std::string inputText(const CacheEntry& entry) {
                        entry.isWhole ? "" : ", interrupted build");
 }
 
-nlohmann::json entryJson(const CacheEntry& entry) {
+nlohmann::json entryJson(const scene::CacheEntry& entry) {
     nlohmann::json j = {{"path", entry.path},
                         {"bytes", entry.bytes},
                         {"last_used", isoTime(entry.used)},
@@ -67,25 +67,25 @@ nlohmann::json entryJson(const CacheEntry& entry) {
 }
 
 Result<void> list(const Options& o) {
-    STIPPLE_ASSIGN(const uint64_t limit, cacheLimit(""));
-    const std::string folder = CacheFolder::path();
-    std::vector<CacheEntry> entries;
+    STIPPLE_ASSIGN(const uint64_t limit, scene::cacheLimit(""));
+    const std::string folder = scene::CacheFolder::path();
+    std::vector<scene::CacheEntry> entries;
     if (std::error_code error; std::filesystem::exists(folder, error)) {
-        STIPPLE_ASSIGN(const CacheFolder cache, CacheFolder::open());
+        STIPPLE_ASSIGN(const scene::CacheFolder cache, scene::CacheFolder::open());
         entries = cache.entries();
-        for (CacheEntry& entry : entries) entry.record = cache.readRecord(entry.key);
+        for (scene::CacheEntry& entry : entries) entry.record = cache.readRecord(entry.key);
     }
     uint64_t sum = 0;
-    for (const CacheEntry& entry : entries) sum += entry.bytes;
+    for (const scene::CacheEntry& entry : entries) sum += entry.bytes;
     if (o.json) {
         nlohmann::json j = {{"folder", folder}, {"bytes", sum}, {"limit_bytes", limit}};
         j["entries"] = nlohmann::json::array();
-        for (const CacheEntry& entry : entries) j["entries"].push_back(entryJson(entry));
+        for (const scene::CacheEntry& entry : entries) j["entries"].push_back(entryJson(entry));
         printJson("cache", j);
         return {};
     }
     if (!entries.empty()) fmt::print("{:>10}  {:>9}  {:>9}  made from\n", "size", "age", "last used");
-    for (const CacheEntry& entry : entries)
+    for (const scene::CacheEntry& entry : entries)
         fmt::print("{:>10}  {:>9}  {:>9}  {}{}\n{:36}{}\n", humanBytes(entry.bytes),
                    entry.record ? ageText(entry.record->made) : "-", ageText(entry.used), inputText(entry),
                    entry.isInUse ? " (in use)" : "", "", printable(entry.path));
@@ -95,25 +95,25 @@ Result<void> list(const Options& o) {
 }
 
 Result<void> clean(const Options& o) {
-    std::vector<CacheEntry> removed;
+    std::vector<scene::CacheEntry> removed;
     uint64_t most = 0, kept = 0, bytes = 0;
     if (!o.to.empty()) {
         most = parseBytes(o.to);
         if (most == 0 && o.to != "0")
             return fail(ErrorKind::usage, fmt::format("'{}' is not a size", o.to), "--to", "e.g. 2G");
     }
-    const std::string folder = CacheFolder::path();
+    const std::string folder = scene::CacheFolder::path();
     if (std::error_code error; std::filesystem::exists(folder, error)) {
-        STIPPLE_ASSIGN(const CacheFolder cache, CacheFolder::open());
+        STIPPLE_ASSIGN(const scene::CacheFolder cache, scene::CacheFolder::open());
         if (o.olderDays >= 0) {
-            for (CacheEntry& entry : cache.entries())
+            for (scene::CacheEntry& entry : cache.entries())
                 if (daysSince(entry.used) >= o.olderDays && cache.remove(entry)) removed.push_back(std::move(entry));
         } else {
             removed = cache.shrinkTo(most);
         }
-        for (const CacheEntry& entry : cache.entries()) kept += entry.isInUse ? 1 : 0;
+        for (const scene::CacheEntry& entry : cache.entries()) kept += entry.isInUse ? 1 : 0;
     }
-    for (const CacheEntry& entry : removed) bytes += entry.bytes;
+    for (const scene::CacheEntry& entry : removed) bytes += entry.bytes;
     if (o.json) {
         printJson("cache", {{"folder", folder}, {"removed", removed.size()}, {"bytes", bytes}, {"in_use", kept}});
         return {};

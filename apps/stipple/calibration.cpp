@@ -7,13 +7,13 @@
 #include <fstream>
 #include <sstream>
 
-#include "apps/stipple/cache_folder.h"
 #include "apps/study/calibration/curve.h"
 #include "apps/study/machine.h"
 #include "apps/study/statistics/intervals.h"
 #include "apps/study/sweep/scene_drawer.h"
 #include "engine/base/file.h"
 #include "engine/base/hash.h"
+#include "engine/scene/open/cache_folder.h"
 
 namespace stipple::app {
 namespace {
@@ -28,7 +28,7 @@ study::Curve curveHere(uint64_t scene, const std::string& device, int threads) {
 std::string pathOf(const study::Curve& curve) {
     const std::string key =
         fmt::format("{}\n{}\n{}\n{}\n{}", curve.scene, curve.device, curve.processor, curve.version, curve.threads);
-    return fmt::format("{}/curves/{}.json", CacheFolder::path(), hexDigits(hashBytes(key.data(), key.size())));
+    return fmt::format("{}/curves/{}.json", scene::CacheFolder::path(), hexDigits(hashBytes(key.data(), key.size())));
 }
 
 std::string nameOf(const render::Backend& backend) { return fmt::format("{}, {}", backend.name(), backend.device()); }

@@ -101,13 +101,6 @@ void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair) {
         ->group("");
 }
 
-scene::ReadSettings BuildOptions::reading() const {
-    scene::ReadSettings reading;
-    reading.allowOutside = allowOutside;
-    if (const uint64_t bytes = parseBytes(memory); bytes > 0) reading.memoryBytes = bytes;
-    return reading;
-}
-
 void BuildOptions::addOutliersTo(CLI::App& app) {
     app.add_flag("--drop-outliers", dropOutliers,
                  "of points leave out invalid returns at the origin (0,0,0), and places with fewer than 16 around them "
@@ -129,11 +122,20 @@ void BuildOptions::addProgressTo(CLI::App& app) {
         ->capture_default_str();
 }
 
-ProgressStyle BuildOptions::progressStyle(bool isQuiet) const {
+ProgressStyle BuildOptions::styleOf(bool isQuiet) const {
     if (isQuiet) return ProgressStyle::silent;
     if (progress == "none") return ProgressStyle::notes;
     if (progress == "bar") return ProgressStyle::bar;
     return progress == "json" ? ProgressStyle::json : automaticProgress();
+}
+
+void printLine(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+OpenSettings BuildOptions::told(bool isQuiet) const {
+    OpenSettings to = *this;
+    to.progressStyle = styleOf(isQuiet);
+    if (!isQuiet) to.say = printLine;
+    return to;
 }
 
 void ColourOptions::addTo(CLI::App& app) {
@@ -159,110 +161,10 @@ void ColourOptions::addTo(CLI::App& app) {
     app.add_flag("--legend", legend, "draw what the colours stand for into the picture");
 }
 
-namespace {
-
-std::vector<std::string> namesOf(const std::string& list) {
-    std::vector<std::string> names;
-    std::istringstream in(list);
-    for (std::string name; std::getline(in, name, ',');)
-        if (!name.empty() && name != "none" && name != "all") names.push_back(lod::attributeBehind(name));
-    return names;
-}
-
-}  // namespace
-
-bool isSceneFile(const std::string& path) {
-    const lod::FileKind kind = lod::fileKindOf(path);
-    if (kind != lod::FileKind::other) return kind == lod::FileKind::glb;
-    const std::string extension = fs::path(path).extension().string();
-    return extension == ".gltf" || extension == ".glb" || extension == ".obj";
-}
-
-Result<lod::BuildSettings> BuildOptions::settings() const {
-    lod::BuildSettings s;
-    s.material = material;
-    s.surfelWeights = surfelWeights;
-    s.memoryBytes = parseBytes(memory);
-    if (s.memoryBytes == 0)
-        return fail(ErrorKind::usage, fmt::format("'{}' is not a size", memory), "--memory", "e.g. 2G");
-    s.normals = normals == "none"   ? lod::NormalsMode::none
-                : normals == "keep" ? lod::NormalsMode::keep
-                                    : lod::NormalsMode::automatic;
-    s.fineNormals = normals == "fine";
-    s.mergeDuplicates = duplicates == "merge";
-    s.dropOutliers = dropOutliers;
-    s.tempFolder = temp;
-    s.isStopped = isStopRequested;
-    s.ranks = ranks;
-    s.leftovers = leftovers;
-    s.estimateRadii = radii != "keep";
-    s.skipBad = skipBad;
-    s.open = [count = surfels, how = reading()](const std::string& path, const lod::ReadOptions& o) {
-        return openInput(path, o, count, how);
-    };
-    s.allAttributes = attributes == "all";
-    s.attributes = namesOf(attributes);
-    if (!up.empty()) s.up = static_cast<lod::UpAxis>(up[0] - 'x');
-    return s;
-}
-
 bool isLit(const std::string& shade, const lod::StoreDescription& d, const lod::ColourBy& colour) {
     if (shade != "auto") return shade == "lit";
-    if (colour.mode == lod::ColourMode::own) return isShaded(d);
+    if (colour.mode == lod::ColourMode::own) return scene::isShaded(d);
     return colour.mode == lod::ColourMode::height || colour.isCategorical;
-}
-
-namespace {
-
-/// Heights of a placed store along the scene's up, in the store's own units: of all stores together, unless `isGiven`.
-void alignHeights(const OpenedScene& scene, const render::PlacedStore& p, bool isGiven, lod::ColourBy& by) {
-    const lod::StoreDescription& all = scene.description;
-    const glm::dvec3 up = glm::transpose(p.place.rotation) * all.up;
-    const bool isAlone = scene.placed.size() == 1 && glm::length(up - p.store->description.up) < 1e-6;
-    by.up = up;
-    if (!isGiven && !isAlone) {
-        by.low = 1e300;
-        by.high = -1e300;
-        for (const glm::dvec3& at : scene.outline) {
-            by.low = std::min(by.low, glm::dot(all.up, at));
-            by.high = std::max(by.high, glm::dot(all.up, at));
-        }
-    }
-    if (isAlone) return;
-    const double base = glm::dot(all.up, p.place.translation);
-    by.low = (by.low - base) / p.place.scale;
-    by.high = (by.high - base) / p.place.scale;
-    if (by.low == by.high) by.high = by.low + 1;
-}
-
-}  // namespace
-
-Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, const std::string& map,
-                                   const std::string& range) {
-    std::optional<lod::ColourBy> first;
-    std::optional<Error> problem;
-    std::map<const lod::Store*, int> places;
-    for (const render::PlacedStore& p : scene.placed) ++places[p.store.get()];
-    for (render::PlacedStore& p : scene.placed) {
-        const lod::Hierarchy& h = p.store->hierarchy;
-        const bool isSurface = h.isMesh() || h.isCurves;
-        if (isSurface && what != "auto" && what != "plain" && what != "rgb") {
-            const char* const kind = h.isMesh() ? "triangles" : "ribbons and tubes";
-            if (!problem)
-                problem = Error{ErrorKind::usage, fmt::format("{} cannot be coloured by '{}'", kind, what), "--colour",
-                                h.isMesh() ? "--surfels N makes points of them" : "leave --colour out"};
-            continue;
-        }
-        // Stores that stand in many places share their records only if those keep their own colours.
-        const bool isPlain = what == "auto" && (isSurface || places[p.store.get()] > 1);
-        auto by = lod::parseColourBy(isPlain ? "plain" : what, map, range, p.store->description);
-        if (!by) problem = problem ? problem : by.error();
-        if (by && by->mode == lod::ColourMode::height) alignHeights(scene, p, !range.empty(), *by);
-        p.colour = by.value_or(lod::ColourBy{});
-        if (by && !first) first = *by;
-    }
-    if (!first) return tl::unexpected(*problem);
-    return *first;
 }
 
 void EnvironmentOptions::addTo(CLI::App& app) {
@@ -271,15 +173,6 @@ void EnvironmentOptions::addTo(CLI::App& app) {
     app.add_option("--environment-scale", scale, "factor of its light")
         ->transform(within(0.0, 1e6))
         ->capture_default_str();
-}
-
-Result<std::shared_ptr<const render::Environment>> openEnvironment(const EnvironmentOptions& options,
-                                                                   uint64_t memoryBytes, Executor& executor,
-                                                                   bool hasMirrors) {
-    if (options.path.empty()) return std::shared_ptr<const render::Environment>();
-    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(options.path, memoryBytes));
-    return std::make_shared<const render::Environment>(
-        render::makeEnvironment(image, static_cast<float>(options.scale), executor, hasMirrors));
 }
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor) {

@@ -100,7 +100,7 @@ Result<void> checkAsked(const Options& o, const CLI::App& sub) {
 }
 
 Result<void> run(const Options& o) {
-    if (!isSceneFile(o.input))
+    if (!scene::isSceneFile(o.input))
         return fail(ErrorKind::usage, "is not read by convert, which takes polygon plants as .gltf, .glb or .obj",
                     o.input, "other files are drawn as they are: stipple render, stipple view");
     const std::string extension = fs::path(o.output).extension().string();
@@ -115,7 +115,8 @@ Result<void> run(const Options& o) {
     const double start = nowSeconds();
     const auto executor = makeTbbExecutor(0);
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.build.reading()));
-    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, o.build.reading().memoryBytes));
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images,
+                   scene::decodeImages(scene, o.build.reading().memoryBytes, printLine));
     scene::CurveFit fit = scene::fitCurves(scene, images, o.fit, *executor);
     STIPPLE_TRY(checkStopped(o.output));
     if (fit.trianglesIn == 0) return fail(ErrorKind::input, "holds no triangles", o.input);

@@ -11,9 +11,9 @@
 
 #include "apps/stipple/build_patches.h"
 #include "apps/stipple/outputs.h"
-#include "apps/stipple/ply_meshes.h"
 #include "engine/base/process.h"
 #include "engine/base/words.h"
+#include "engine/scene/open/ply_meshes.h"
 #include "engine/scene/place_looks.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/points/input_colours.h"
@@ -73,12 +73,12 @@ bool isBlack(const std::vector<uint32_t>& colours) {
 
 Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& notes) {
     Source out;
-    if (isSceneFile(o.input)) {
+    if (scene::isSceneFile(o.input)) {
         STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(o.input, o.build.reading()));
         STIPPLE_ASSIGN(out.mesh, collect(scene::triangleSource(scene, scene::placements(scene)), o.output));
         out.isMesh = !out.mesh.indices.empty();
         if (out.isMesh) {
-            STIPPLE_ASSIGN(out.images, decodeImages(scene, o.build.reading().memoryBytes));
+            STIPPLE_ASSIGN(out.images, scene::decodeImages(scene, o.build.reading().memoryBytes, printLine));
             out.scene = std::make_unique<scene::Scene>(std::move(scene));
             out.looks = scene::placeLooks(*out.scene, out.images);
             out.materials = scene::materialList(*out.scene).list;
@@ -94,7 +94,7 @@ Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& no
         out.isMesh = true;
         return out;
     }
-    STIPPLE_ASSIGN(const lod::PointSource source, openInput(o.input, {}, 0, o.build.reading()));
+    STIPPLE_ASSIGN(const lod::PointSource source, scene::openInput(o.input, {}, 0, o.build.reading(), printLine));
     out.isTwoSided = source.info.isTwoSided;
     if (source.info.up == lod::UpAxis::z)
         notes.emplace_back("z is up in this file, and y in glTF: coordinates stay as they are, draw them with --up z");
@@ -357,7 +357,7 @@ Result<void> convertToPatches(const PatchConversion& given) {
     std::vector<lod::PointMaterial> materials;
     bool isMesh = false, isUnlit = false;
     {
-        Progress progress(o.build.progressStyle(false));
+        Progress progress(o.build.styleOf(false));
         STIPPLE_ASSIGN(Source source, readSource(o, notes));
         isMesh = source.isMesh;
         isUnlit = source.isUnlit;

@@ -437,7 +437,7 @@ Result<void> showCurves(const InputInfoOptions& o) {
 }  // namespace
 
 Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
-    if (isSceneFile(o.input)) return showScene(o);
+    if (scene::isSceneFile(o.input)) return showScene(o);
     if (lod::isCurveFile(o.input)) return showCurves(o);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs({o.input}));
     if (files.size() != 1) return showFolder(o, files, executor);

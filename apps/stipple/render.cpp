@@ -14,9 +14,7 @@
 #include "apps/stipple/legend.h"
 #include "apps/stipple/mode_options.h"
 #include "apps/stipple/outputs.h"
-#include "apps/stipple/ply_meshes.h"
 #include "apps/stipple/render_frames.h"
-#include "apps/stipple/scene_facts.h"
 #include "apps/stipple/sun_options.h"
 #include "engine/base/file.h"
 #include "engine/base/process.h"
@@ -28,6 +26,8 @@
 #include "engine/reference/reference.h"
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/open/ply_meshes.h"
+#include "engine/scene/open/scene_facts.h"
 #include "lod/store/file_kind.h"
 #include "lod/store/materials.h"
 
@@ -332,7 +332,7 @@ void sayShadows(const render::FrameState& state) {
 }
 
 Result<void> checkWeights(const Options& o, const OpenedScene& scene) {
-    if (o.drawn.normalise != "surfel" || hasSurfelWeights(scene.placed)) return {};
+    if (o.drawn.normalise != "surfel" || scene::hasSurfelWeights(scene.placed)) return {};
     return fail(ErrorKind::usage, "no store of the scene has weights of surfels", "--normalise surfel",
                 "build it with: stipple build --surfel-weights, or take --normalise pixel");
 }
@@ -345,20 +345,21 @@ Result<void> run(const Options& o, Written& written) {
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_TRY(checkModule(o));
-    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
+    STIPPLE_ASSIGN(OpenedScene scene, scene::openScene(o.inputs, o.build.told(o.quiet), *executor));
     STIPPLE_TRY(checkWeights(o, scene));
     const uint64_t hash = o.target.isAny() ? sceneHash(scene) : 0;
-    if (o.material.material() && !takesMaterial(scene.placed)) return noPointsToLight(o.inputs.front());
+    if (o.material.material() && !scene::takesMaterial(scene.placed)) return scene::noPointsToLight(o.inputs.front());
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     written.of = shot.views.size();
     if (!shot.note.empty() && !o.quiet) fmt::print(stderr, "note: {}\n", printable(shot.note));
-    STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
+    STIPPLE_ASSIGN(const lod::ColourBy colour, scene::applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
-    STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment, o.build.reading().memoryBytes, *executor,
-                                                              hasMirrors(scene.placed, o.material.material())));
+    STIPPLE_ASSIGN(settings.draw.environment,
+                   scene::openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes,
+                                          *executor, scene::hasMirrors(scene.placed, o.material.material())));
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
-    STIPPLE_TRY(o.effects.applyTo(settings.draw, scene.effects, storesOf(scene.placed), o.quiet));
+    STIPPLE_TRY(o.effects.applyTo(settings.draw, scene.effects, scene::storesOf(scene.placed), o.quiet));
     if (o.drawn.mode == "reference") return runTraced(o, scene, shot, settings, legend, *executor, written);
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(o.resident);

@@ -30,7 +30,7 @@ void SceneOpener::start(std::vector<std::string> inputs) {
     launch([inputs = std::move(inputs), build = build_]() {
         try {
             const auto executor = makeTbbExecutor(build.threads);
-            return openScene(inputs, build, *executor, true);
+            return scene::openScene(inputs, build.told(false), *executor);
         } catch (const std::bad_alloc&) {
             return Result<OpenedScene>(fail(ErrorKind::budget, "there is not enough memory to open it", inputs.front(),
                                             "give a smaller --memory"));

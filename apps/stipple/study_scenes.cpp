@@ -10,7 +10,6 @@
 #include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/mode_options.h"
-#include "apps/stipple/scene_facts.h"
 #include "apps/study/sweep/paths.h"
 #include "apps/study/sweep/report.h"
 #include "engine/base/file.h"
@@ -19,6 +18,7 @@
 #include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/image/image_io.h"
+#include "engine/scene/open/scene_facts.h"
 
 namespace stipple::app {
 namespace {
@@ -104,11 +104,11 @@ Result<void> checkFolder(const std::string& folder) {
 }
 
 Result<study::StudyScene> studySceneOf(const std::string& input, const StudyOptions& o, Executor& executor) {
-    STIPPLE_ASSIGN(OpenedScene opened, openScene({input}, o.build, executor, !o.quiet && !o.json));
-    STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(opened, "auto", "", ""));
+    STIPPLE_ASSIGN(OpenedScene opened, scene::openScene({input}, o.build.told(o.quiet || o.json), executor));
+    STIPPLE_ASSIGN(const lod::ColourBy colour, scene::applyColours(opened, "auto", "", ""));
     study::StudyScene s;
     s.name = printable(fs::path(input).filename().string());
-    if (!isSceneFile(input) && hasPoints(opened.placed)) s.source = input;
+    if (!scene::isSceneFile(input) && scene::hasPoints(opened.placed)) s.source = input;
     s.hash = sceneHash(opened);
     s.draw.lights = opened.lights;
     s.draw.lit = isLit("auto", opened.description, colour);
@@ -225,7 +225,7 @@ Result<void> runSceneStudy(const StudyOptions& o) {
                 if (v.name == name) v.set(with.build);
             STIPPLE_ASSIGN(study::StudyScene scene, studySceneOf(input, with, *executor));
             if (name != "usual") scene.name += " (" + name + ")";
-            isAnyPoints = isAnyPoints || hasPoints(scene.placed);
+            isAnyPoints = isAnyPoints || scene::hasPoints(scene.placed);
             scenes.push_back(std::move(scene));
         }
     if (!isAnyPoints && o.modes.empty()) settings.modes.resize(1);  // modes are ways of drawing points

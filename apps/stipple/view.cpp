@@ -11,9 +11,7 @@
 
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
-#include "apps/stipple/ply_meshes.h"
 #include "apps/stipple/render_frames.h"
-#include "apps/stipple/scene_facts.h"
 #include "apps/stipple/scene_opener.h"
 #include "apps/stipple/view_session.h"
 #include "apps/study/calibration/steady.h"
@@ -23,6 +21,8 @@
 #include "engine/gpu/gpu_backend.h"
 #include "engine/image/image_io.h"
 #include "engine/render/accumulation.h"
+#include "engine/scene/open/ply_meshes.h"
+#include "engine/scene/open/scene_facts.h"
 
 namespace stipple::app {
 namespace {
@@ -264,7 +264,7 @@ class Viewer {
         if (std::exchange(hasChanged_, false)) {
             accumulating_.clear();
             const bool canWeigh = render::reconstructionOf(settings_.frame.mode).blendsSplats &&
-                                  hasSurfelWeights(session_.scene().placed);
+                                  scene::hasSurfelWeights(session_.scene().placed);
             settings_.frame.draw.perSurfel = refinement_.isQuick(canWeigh, !isResting_);
             if (auto drawn = render(settings_.frame); !drawn) {
                 if (drawn.error().kind == ErrorKind::device) return drawn;
@@ -452,14 +452,14 @@ Result<void> run(const ViewOptions& o) {
     STIPPLE_TRY(o.effects.check());
     STIPPLE_TRY(o.sun.check(o.shade));
     STIPPLE_TRY(checkScreenshot(o));
-    STIPPLE_TRY(checkInputs(o.inputs));
+    STIPPLE_TRY(scene::checkInputs(o.inputs));
     if (!gpu::hasDisplay())
         return fail(ErrorKind::device, "there is no display", "stipple view",
                     "use stipple render, or xvfb-run stipple view");
     catchStopSignals();
     const auto executor = makeTbbExecutor(o.build.threads);
-    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, true));
-    if (o.material.material() && !takesMaterial(scene.placed)) return noPointsToLight(o.inputs.front());
+    STIPPLE_ASSIGN(OpenedScene scene, scene::openScene(o.inputs, o.build.told(false), *executor));
+    if (o.material.material() && !scene::takesMaterial(scene.placed)) return scene::noPointsToLight(o.inputs.front());
     const uint64_t hash = o.target.isAny() ? sceneHash(scene) : 0;
     STIPPLE_ASSIGN(const Stage stage, setStage(o, "Stipple: " + scene.description.source, size, *executor));
     gpu::Window* const window = stage.window.get();
@@ -470,8 +470,9 @@ Result<void> run(const ViewOptions& o) {
     frame.draw.unlitTriangles = o.shade == "unlit";
     frame.draw.wind.strength = o.wind;
     frame.staysOnDevice = stage.isShared;
-    STIPPLE_ASSIGN(frame.draw.environment, openEnvironment(o.environment, o.build.reading().memoryBytes, *executor,
-                                                           hasMirrors(scene.placed, o.material.material())));
+    STIPPLE_ASSIGN(frame.draw.environment,
+                   scene::openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes,
+                                          *executor, scene::hasMirrors(scene.placed, o.material.material())));
     ViewSession session(o, *stage.backend, *executor);
     STIPPLE_TRY(session.show(std::move(scene), o.colour, frame));
     const double aspect = static_cast<double>(size.x) / size.y;

@@ -1,5 +1,5 @@
 #include "apps/stipple/view_session.h"
-#include "apps/stipple/scene_facts.h"
+#include "engine/scene/open/scene_facts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,7 +36,8 @@ void ViewSession::restart(render::FrameSettings& settings) {
         settings.draw.lit = true;
     }
     // What could be said was, before the window opened.
-    if (const auto asked = options_.effects.applyTo(settings.draw, scene_.effects, storesOf(scene_.placed), false);
+    if (const auto asked =
+            options_.effects.applyTo(settings.draw, scene_.effects, scene::storesOf(scene_.placed), false);
         !asked)
         report(asked.error());
     render::setSway(settings.draw.wind, state_->hierarchies, state_->instances, state_->groups);
@@ -49,7 +50,7 @@ int ViewSession::upAxis() const {
 }
 
 Result<void> ViewSession::show(OpenedScene scene, const ColourOptions& colour, render::FrameSettings& settings) {
-    STIPPLE_ASSIGN(colour_, applyColours(scene, colour.what, colour.map, colour.range));
+    STIPPLE_ASSIGN(colour_, scene::applyColours(scene, colour.what, colour.map, colour.range));
     shown_ = colour;
     std::swap(scene_, scene);  // what was shown lives until its chunks are given back
     ownUpAxis_ = upAxis();
@@ -73,7 +74,7 @@ Result<void> ViewSession::nextColours(render::FrameSettings& settings) {
     for (const render::PlacedStore& p : scene_.placed) before.push_back(p.colour);
     std::optional<Error> problem;
     for (const std::string& name : coloursAfter(colour_, scene_.description)) {
-        const auto colours = applyColours(scene_, name, "", "");
+        const auto colours = scene::applyColours(scene_, name, "", "");
         if (colours && (colours->mode != lod::ColourMode::own || colour_.mode != lod::ColourMode::own)) {
             colour_ = *colours;
             shown_ = {name, "", "", shown_.legend};
@@ -93,7 +94,7 @@ void ViewSession::turnUp(render::FrameSettings& settings) {
     settings.draw.worldUp = scene_.description.up;
     settings.draw.wind.towards = render::windAcross(settings.draw.worldUp);
     if (colour_.mode != lod::ColourMode::height) return;  // heights are along it
-    if (const auto colours = applyColours(scene_, shown_.what, shown_.map, shown_.range); colours) {
+    if (const auto colours = scene::applyColours(scene_, shown_.what, shown_.map, shown_.range); colours) {
         colour_ = *colours;
         restart(settings);
     }

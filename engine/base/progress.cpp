@@ -64,7 +64,8 @@ void JobPlan::beginPart(double before, double own, double after) {
     setStages({});
 }
 
-Progress::Progress(ProgressStyle style) : style_(style), startSeconds_(nowSeconds()) {
+Progress::Progress(ProgressStyle style, ProgressCall call)
+    : style_(style), call_(std::move(call)), startSeconds_(nowSeconds()) {
     lastPrintSeconds_ = startSeconds_;
 }
 
@@ -101,7 +102,8 @@ void Progress::say(const std::string& line) {
 }
 
 void Progress::update(const std::string& stage, uint64_t done, uint64_t total) {
-    if (style_ != ProgressStyle::bar && style_ != ProgressStyle::json) return;
+    const bool isPrinted = style_ == ProgressStyle::bar || style_ == ProgressStyle::json;
+    if (!isPrinted && !call_) return;
     const std::lock_guard lock(mutex_);
     const double now = nowSeconds();
     if (stage != stage_) {
@@ -110,14 +112,15 @@ void Progress::update(const std::string& stage, uint64_t done, uint64_t total) {
     }
     const double fraction = plan_.advance(stage, total ? static_cast<double>(done) / static_cast<double>(total) : 0);
     if (firstFraction_ < 0) firstFraction_ = fraction;
-    if (now - lastPrintSeconds_ < (style_ == ProgressStyle::bar ? 0.1 : 1.0)) return;
+    if (now - lastPrintSeconds_ < (style_ == ProgressStyle::json ? 1.0 : 0.1)) return;
     lastPrintSeconds_ = now;
     const double elapsed = now - stageSeconds_, gone = fraction - firstFraction_;
     const double rate = elapsed > 0 ? static_cast<double>(done) / elapsed : 0;
     const double left = gone > 0 ? (now - startSeconds_) * (1 - fraction) / gone : -1;
+    if (call_) call_({stage, fraction, left});
     if (style_ == ProgressStyle::bar)
         printBar(fraction, rate, left);
-    else
+    else if (style_ == ProgressStyle::json)
         printJson(done, total, fraction, rate, left);
 }
 

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -43,11 +44,20 @@ class JobPlan {
     double from_ = 0, share_ = 1, whole_ = 0;
 };
 
+/// How far a job is.
+struct ProgressReport {
+    std::string stage;
+    double fraction = 0;      ///< of the whole job, 0 to 1; never falls
+    double secondsLeft = -1;  ///< estimated; -1: not known yet
+};
+/// Called at most ten times a second, by the thread that got so far, one at a time.
+using ProgressCall = std::function<void(const ProgressReport&)>;
+
 class Progress {
   public:
     /// `enabled` false: says nothing.
     explicit Progress(bool enabled) : Progress(enabled ? automaticProgress() : ProgressStyle::silent) {}
-    explicit Progress(ProgressStyle style);
+    explicit Progress(ProgressStyle style, ProgressCall call = {});
     ~Progress();
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;
@@ -75,6 +85,7 @@ class Progress {
     std::mutex mutex_;
     std::atomic<uint64_t> temporaryBytes_{0};
     ProgressStyle style_;
+    const ProgressCall call_;
     bool dirty_ = false;
     JobPlan plan_;
     double startSeconds_, stageSeconds_ = 0, lastPrintSeconds_ = 0;

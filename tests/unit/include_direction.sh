@@ -2,10 +2,10 @@
 # Who may include whom (ARCHITECTURE, one direction). Fails with the offending lines.
 cd "$1" || exit 2
 status=0
-# allow FOLDER REGEX: includes of project headers in FOLDER must match REGEX.
+# allow FOLDER REGEX [BUT]: includes of project headers in FOLDER, and not in BUT, must match REGEX.
 allow() {
     local bad
-    bad=$(grep -rnE '^#include "(engine|lod|streaming|shaders|apps|tests)/' "$1" --include='*.h' --include='*.cpp' --include='*.inl' | grep -vE "#include \"($2)/")
+    bad=$(grep -rnE '^#include "(engine|lod|streaming|shaders|apps|tests)/' "$1" --include='*.h' --include='*.cpp' --include='*.inl' | grep -vE "#include \"($2)/" | grep -v "^${3:-/}/")
     if [ -n "$bad" ]; then
         printf '%s may include only %s:\n%s\n' "$1" "$2" "$bad"
         status=1
@@ -21,7 +21,8 @@ allow lod/verify 'engine/base|shaders/shared|lod/(primitives|store|cut|verify)'
 allow lod/import 'engine/base|shaders/shared|lod'
 allow lod/builder 'engine/base|shaders/shared|lod'
 allow streaming 'engine/base|shaders/shared|lod|streaming'
-allow engine/scene 'engine/base|engine/scene|shaders/shared|lod'
+allow engine/scene 'engine/base|engine/scene|shaders/shared|lod' engine/scene/open
+allow engine/scene/open 'engine/(base|scene|render|image)|shaders/shared|lod|streaming'
 allow engine/render 'engine/base|engine/render|engine/scene|shaders/shared|lod|streaming'
 allow engine/cpu 'engine/base|engine/render|engine/cpu|shaders/shared|lod|streaming'
 allow engine/gpu 'engine/base|engine/render|engine/gpu|shaders/shared|lod|streaming'

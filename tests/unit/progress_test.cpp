@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "apps/stipple/builds_of_scene.h"
+#include "engine/scene/open/builds_of_scene.h"
 
 namespace stipple {
 namespace {
@@ -45,7 +45,7 @@ TEST(JobPlan, SeveralJobsOfOneSceneAreOneJob) {
 }
 
 TEST(BuildsOfScene, ShareOneBar) {
-    app::BuildsOfScene builds(ProgressStyle::silent, {"a.glb: a note"});
+    scene::BuildsOfScene builds(ProgressStyle::silent, {}, {"a.glb: a note"});
     builds.expect("mesh 0", 10);
     builds.expect("mesh 0, proxy", 10);
     builds.expect("curves", 20);

@@ -3,24 +3,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "apps/stipple/builds_of_scene.h"
-#include "apps/stipple/cache.h"
-#include "apps/stipple/common.h"
-#include "apps/stipple/ply_meshes.h"
-#include "apps/stipple/proxies.h"
-#include "apps/stipple/scene_facts.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/image/image_io.h"
 #include "engine/scene/curves.h"
 #include "engine/scene/gltf/container.h"
+#include "engine/scene/open/builds_of_scene.h"
+#include "engine/scene/open/cache.h"
+#include "engine/scene/open/open_scene.h"
+#include "engine/scene/open/ply_meshes.h"
+#include "engine/scene/open/proxies.h"
+#include "engine/scene/open/scene_facts.h"
 #include "engine/scene/outline.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/curves/curve_build.h"
@@ -31,28 +30,28 @@
 #include "lod/store/file_kind.h"
 #include "lod/store/nearest.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 namespace fs = std::filesystem;
 
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
-                                   const scene::ReadSettings& reading) {
+                                   const ReadSettings& reading, const Say& say) {
     if (!isSceneFile(path)) return lod::openPointSource(path, options);
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, reading));
-    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, reading.memoryBytes));
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, reading.memoryBytes, say));
     return scene::sampleSurfels(scene, images, {surfels});
 }
 
 namespace {
 
 /// With every attribute that there is, so that no colour asks for another build.
-Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, const BuildOptions& build,
-                                                    Executor& executor, bool showProgress) {
+Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, const OpenSettings& build,
+                                                    Executor& executor) {
     STIPPLE_ASSIGN(const lod::BuildSettings asked, build.settings());
     lod::BuildSettings settings = asked;
     settings.attributes.clear();
     settings.allAttributes = settings.leaveOutUnlike = !isSceneFile(inputs.front());
     STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
-                   openCached(inputs, build, "points", showProgress, [&](const std::string& path, Progress& progress) {
+                   openCached(inputs, build, "points", [&](const std::string& path, Progress& progress) {
                        return lod::buildStore(inputs, path, settings, executor, progress);
                    }));
     const std::vector<lod::AttributeInfo>& has = store->description.attributes;
@@ -88,19 +87,20 @@ Result<lod::Instance> placeOf(const glm::dmat4& m, const std::string& where) {
 lod::UpAxis axisNamed(const std::string& up) { return static_cast<lod::UpAxis>(up[0] - 'x'); }
 
 /// What `--up` says, else y, as glTF, OBJ and PLY have it.
-glm::dvec3 meshUp(const BuildOptions& build) {
+glm::dvec3 meshUp(const OpenSettings& build) {
     return lod::axisVector(build.up.empty() ? lod::UpAxis::y : axisNamed(build.up));
 }
 
 /// Of the placed meshes of a scene.
 Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene, const std::vector<scene::Placement>& placed,
-                                            const BuildOptions& build) {
+                                            const OpenSettings& build) {
     lod::MeshBuildSettings settings;
     settings.description.source = fs::path(scene.path).filename().string();
     settings.description.up = meshUp(build);
     settings.description.materials = scene::surfaceMaterials(scene);
     settings.textures = scene::textureImages(scene);
-    STIPPLE_ASSIGN(std::vector<scene::DecodedImage> images, decodeImages(scene, build.reading().memoryBytes));
+    STIPPLE_ASSIGN(std::vector<scene::DecodedImage> images,
+                   decodeImages(scene, build.reading().memoryBytes, build.say));
     settings.description.optics = scene::surfaceOptics(scene, placed, images);
     std::vector<size_t> last(images.size());  // texture that uses an image last, and may have it
     for (size_t t = 0; t < settings.textures.size(); ++t)
@@ -128,7 +128,7 @@ lod::CurveBuildSettings curveSettings(const std::string& input) {
 
 /// Ribbons and tubes.
 Result<lod::BuildReport> buildCurves(const lod::CurveSource& raw, const std::string& input, const std::string& output,
-                                     const BuildOptions& build, Executor& executor, Progress& progress) {
+                                     const OpenSettings& build, Executor& executor, Progress& progress) {
     lod::CurveBuildSettings settings = curveSettings(input);
     STIPPLE_ASSIGN(settings.limits, build.settings());
     settings.description.isRigid = !raw.isPlant;
@@ -143,7 +143,7 @@ Result<lod::BuildReport> buildCurves(const lod::CurveSource& raw, const std::str
     return lod::buildCurveStore(lod::cleanSource(turned, build.curveRadius), output, settings, executor, progress);
 }
 
-Result<lod::BuildReport> buildCurveFile(const std::string& input, const std::string& output, const BuildOptions& build,
+Result<lod::BuildReport> buildCurveFile(const std::string& input, const std::string& output, const OpenSettings& build,
                                         Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::CurveSource curves, lod::openCurves(input));
     return buildCurves(curves, input, output, build, executor, progress);
@@ -177,7 +177,7 @@ SharedPlaces sharePlaces(const scene::Scene& scene, scene::PrimitiveKind kind) {
 }
 
 /// The triangles of a scene.
-Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
+Result<void> placeTriangles(const scene::Scene& scene, const OpenSettings& build, Executor& executor,
                             std::vector<render::PlacedStore>& placed) {
     const auto make = [&](const std::vector<scene::Placement>& of) {
         return [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
@@ -190,10 +190,9 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
     for (const auto& [mesh, instances] : places.shared) {
         const std::vector<scene::Placement> own{{mesh, glm::dmat4(1)}};
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
-                       openCached({scene.path}, build, fmt::format("mesh {}", mesh), showProgress, make(own)));
+                       openCached({scene.path}, build, fmt::format("mesh {}", mesh), make(own)));
         render::PlacedStore one{store, {}, {}};
-        STIPPLE_ASSIGN(one.proxies,
-                       meshProxies(scene, own, *store, fmt::format("mesh {}", mesh), build, executor, showProgress));
+        STIPPLE_ASSIGN(one.proxies, meshProxies(scene, own, *store, fmt::format("mesh {}", mesh), build, executor));
         build.together->settle(fmt::format("mesh {}, proxy", mesh));  // what is small has none
         for (const lod::Instance& instance : instances) {
             one.place = instance;
@@ -202,9 +201,9 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
     }
     if (places.once.empty()) return {};
     STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
-                   openCached({scene.path}, build, "triangles", showProgress, make(places.once)));
+                   openCached({scene.path}, build, "triangles", make(places.once)));
     render::PlacedStore one{store, {}, {}};
-    STIPPLE_ASSIGN(one.proxies, meshProxies(scene, places.once, *store, "triangles", build, executor, showProgress));
+    STIPPLE_ASSIGN(one.proxies, meshProxies(scene, places.once, *store, "triangles", build, executor));
     build.together->settle("triangles, proxy");
     placed.push_back(std::move(one));
     return {};
@@ -212,16 +211,15 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
 
 /// The ribbons and tubes of a scene. What stands in many places also gets a proxy, and all those
 /// together are an instance group.
-Result<void> placeCurves(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
+Result<void> placeCurves(const scene::Scene& scene, const OpenSettings& build, Executor& executor,
                          OpenedScene& opened) {
     const auto open = [&](const SharedModel& model, const std::string& part) {
-        return openCached({scene.path}, build, part, showProgress,
-                          [&](const std::string& to, Progress& progress) -> Result<lod::BuildReport> {
-                              lod::CurveBuildSettings settings = curveSettings(scene.path);
-                              STIPPLE_ASSIGN(settings.limits, build.settings());
-                              return lod::buildCurveStore(lod::sourceOf(model->curves()), to, settings, executor,
-                                                          progress);
-                          });
+        return openCached(
+            {scene.path}, build, part, [&](const std::string& to, Progress& progress) -> Result<lod::BuildReport> {
+                lod::CurveBuildSettings settings = curveSettings(scene.path);
+                STIPPLE_ASSIGN(settings.limits, build.settings());
+                return lod::buildCurveStore(lod::sourceOf(model->curves()), to, settings, executor, progress);
+            });
     };
     const auto modelOf = [&](const std::vector<scene::Placement>& of) {
         return std::make_shared<CurveModel>(
@@ -237,7 +235,7 @@ Result<void> placeCurves(const scene::Scene& scene, const BuildOptions& build, E
         const std::string part = fmt::format("curves of mesh {}", mesh);
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, open(model, part));
         render::PlacedStore one{store, {}, {}};
-        STIPPLE_ASSIGN(one.proxies, curveProxies(model, *store, scene.path, part, build, executor, showProgress));
+        STIPPLE_ASSIGN(one.proxies, curveProxies(model, *store, scene.path, part, build, executor));
         build.together->settle(part + ", proxy");
         const auto first = static_cast<uint32_t>(opened.placed.size());
         for (const lod::Instance& instance : instances) {
@@ -246,7 +244,7 @@ Result<void> placeCurves(const scene::Scene& scene, const BuildOptions& build, E
         }
         group.add(model, first, static_cast<uint32_t>(instances.size()));
     }
-    STIPPLE_TRY(group.finish(scene.path, build, executor, showProgress, opened));
+    STIPPLE_TRY(group.finish(scene.path, build, executor, opened));
     if (places.once.empty()) return {};
     STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(modelOf(places.once), "curves"));
     opened.placed.push_back({std::move(store), {}, {}});
@@ -263,10 +261,10 @@ double workOf(const scene::Scene& scene, const std::vector<scene::Placement>& of
 }
 
 /// What may have to be built of a scene. (Proxies take about as long as what they stand for.)
-std::shared_ptr<BuildsOfScene> expectedBuilds(const scene::Scene& scene, bool areTriangles, ProgressStyle style) {
+std::shared_ptr<BuildsOfScene> expectedBuilds(const scene::Scene& scene, bool areTriangles, const OpenSettings& build) {
     std::vector<std::string> notes;
     for (const std::string& note : scene.notes) notes.push_back(fmt::format("{}: {}", scene.path, note));
-    auto builds = std::make_shared<BuildsOfScene>(style, std::move(notes));
+    auto builds = std::make_shared<BuildsOfScene>(build.progressStyle, build.onProgress, std::move(notes));
     const auto expect = [&](const std::string& part, double work, bool hasProxy) {
         builds->expect(part, work);
         if (hasProxy) builds->expect(part + ", proxy", work);
@@ -285,11 +283,11 @@ std::shared_ptr<BuildsOfScene> expectedBuilds(const scene::Scene& scene, bool ar
 }
 
 /// The stores that a scene's nodes refer to, and its meshes.
-Result<void> openSceneFile(const std::string& path, const BuildOptions& options, Executor& executor, bool showProgress,
+Result<void> openSceneFile(const std::string& path, const OpenSettings& options, Executor& executor,
                            OpenedScene& opened) {
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, options.reading()));
-    BuildOptions build = options;
-    build.together = expectedBuilds(scene, build.surfels == 0, build.progressStyle(!showProgress));
+    OpenSettings build = options;
+    build.together = expectedBuilds(scene, build.surfels == 0, build);
     opened.lights = lightsOf(scene);
     opened.cameras = camerasOf(scene);
     opened.effects = {scene.effects.names, scene.effects.values, path};
@@ -315,19 +313,18 @@ Result<void> openSceneFile(const std::string& path, const BuildOptions& options,
     const auto anyHolds = [&](scene::PrimitiveKind kind) {
         return std::any_of(meshes.begin(), meshes.end(), [&](const auto& p) { return holds(scene, p, kind); });
     };
-    if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, showProgress, placed));
-    STIPPLE_TRY(placeCurves(scene, build, executor, showProgress, opened));
+    if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, placed));
+    STIPPLE_TRY(placeCurves(scene, build, executor, opened));
     if (build.surfels > 0 || anyHolds(scene::PrimitiveKind::points) || placed.empty()) {
-        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points, openBuilt({path}, build, executor, showProgress));
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points, openBuilt({path}, build, executor));
         placed.push_back({std::move(points), {}, {}});
     }
-    for (const std::string& note : scene.notes)
-        if (showProgress) fmt::print(stderr, "note: {}\n", printable(note));
+    for (const std::string& note : scene.notes) say(build, "note: " + printable(note));
     return {};
 }
 
 /// Of PLY files with faces; their paths are made by whoever builds them.
-Result<lod::MeshBuildSettings> plySettings(const BuildOptions& build) {
+Result<lod::MeshBuildSettings> plySettings(const OpenSettings& build) {
     scene::Scene plain;
     return meshSettings(plain, {}, build);
 }
@@ -367,7 +364,7 @@ Result<void> areSeen(const std::vector<std::string>& inputs) {
 
 /// Scans, or PLY files that all have faces.
 Result<lod::BuildReport> buildFiles(const std::vector<std::string>& inputs, const std::string& output,
-                                    const BuildOptions& build, Executor& executor, Progress& progress) {
+                                    const OpenSettings& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
     if (meshes.areAll()) {
         if (build.material) return noPointsToLight(inputs.front());
@@ -386,7 +383,7 @@ Result<lod::BuildReport> buildFiles(const std::vector<std::string>& inputs, cons
 }  // namespace
 
 Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
-                                  const BuildOptions& build, Executor& executor, Progress& progress) {
+                                  const OpenSettings& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     STIPPLE_TRY(agree(build.ranks, areSeen(inputs)));
     for (const std::string& input : inputs)
@@ -430,23 +427,23 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
 namespace {
 
 /// The stores of inputs that are no scene file.
-Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::string>& inputs, const BuildOptions& build,
-                                                    Executor& executor, bool showProgress) {
+Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::string>& inputs, const OpenSettings& build,
+                                                    Executor& executor) {
     if (lod::isStoreFile(inputs.front())) return openStoreFile(inputs.front());
     if (inputs.size() == 1 && lod::isCurveFile(inputs[0]) && build.surfels > 0) return nothingToSample(inputs[0]);
     if (inputs.size() == 1 && lod::isCurveFile(inputs[0]))
-        return openCached(inputs, build, "curves", showProgress, [&](const std::string& path, Progress& progress) {
+        return openCached(inputs, build, "curves", [&](const std::string& path, Progress& progress) {
             return buildCurveFile(inputs[0], path, build, executor, progress);
         });
     STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
     if (meshes.areAll())
-        return openCached(inputs, build, "triangles", showProgress,
+        return openCached(inputs, build, "triangles",
                           [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
                               STIPPLE_ASSIGN(lod::MeshBuildSettings settings, plySettings(build));
                               return buildPlyMeshes(meshes.files, path, build, std::move(settings), executor, progress);
                           });
-    if (const std::string note = meshes.note(); !note.empty() && showProgress) fmt::print(stderr, "note: {}\n", note);
-    return openBuilt(inputs, build, executor, showProgress);
+    if (const std::string note = meshes.note(); !note.empty()) say(build, "note: " + note);
+    return openBuilt(inputs, build, executor);
 }
 
 }  // namespace
@@ -469,18 +466,17 @@ Result<void> checkInputs(const std::vector<std::string>& inputs) {
     return {};
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& given, Executor& executor,
-                              bool showProgress) {
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const OpenSettings& given, Executor& executor) {
     STIPPLE_TRY(checkInputs(inputs));
     OpenedScene scene;
     // The axis is of the picture: what is in the cache serves any.
-    BuildOptions build = given;
+    OpenSettings build = given;
     build.up.clear();
     build.leftovers = lod::Leftovers::goOnOrReplace;
     if (isSceneFile(inputs.front())) {
-        STIPPLE_TRY(openSceneFile(inputs.front(), build, executor, showProgress, scene));
+        STIPPLE_TRY(openSceneFile(inputs.front(), build, executor, scene));
     } else {
-        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, openFiles(inputs, build, executor, showProgress));
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, openFiles(inputs, build, executor));
         scene.placed.push_back({std::move(store), {}, {}});
     }
     // Points that stand in for meshes are lit. Beside scans that keep their photographed colours they would not be,
@@ -497,10 +493,19 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     scene.outline = outlineOf(scene.placed);
     if (!given.up.empty())
         turnUp(scene, axisNamed(given.up));
-    else if (showProgress && !isSceneFile(inputs.front()) && scene::looksZUp(scene.description))
-        fmt::print(stderr, "note: the scene is flat along z, but y is up, as its format has it; is z up? --up z\n");
+    else if (!isSceneFile(inputs.front()) && looksZUp(scene.description))
+        say(build, "note: the scene is flat along z, but y is up, as its format has it; is z up? --up z");
     releaseFreeMemory();
     return scene;
 }
 
-}  // namespace stipple::app
+Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
+                                                                   uint64_t memoryBytes, Executor& executor,
+                                                                   bool hasMirrors) {
+    if (path.empty()) return std::shared_ptr<const render::Environment>();
+    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(path, memoryBytes));
+    return std::make_shared<const render::Environment>(
+        render::makeEnvironment(image, static_cast<float>(scale), executor, hasMirrors));
+}
+
+}  // namespace stipple::scene

@@ -10,7 +10,7 @@
 
 #include "engine/base/lock_file.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 
 /// What a store in the cache was made from.
 struct CacheRecord {
@@ -70,4 +70,4 @@ class CacheFolder {
 /// What the cache may hold: `option`, else STIPPLE_CACHE_LIMIT, else 20 GiB or a fifth of the disk, whichever is less.
 Result<uint64_t> cacheLimit(const std::string& option);
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

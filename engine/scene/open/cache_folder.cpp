@@ -1,4 +1,4 @@
-#include "apps/stipple/cache_folder.h"
+#include "engine/scene/open/cache_folder.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -19,7 +19,7 @@
 #include "engine/base/text.h"
 #include "engine/base/units.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 namespace fs = std::filesystem;
 using Clock = std::chrono::system_clock;
 
@@ -263,4 +263,4 @@ Result<uint64_t> cacheLimit(const std::string& option) {
     return error ? kMost : std::min<uint64_t>(kMost, disk.capacity / kShareOfDisk);
 }
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/stipple/common.h"
+#include "engine/scene/open/open_scene.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 
 Result<std::shared_ptr<const lod::Store>> openStoreFile(const std::string& path);
 
@@ -18,8 +18,7 @@ using StoreMaker = std::function<Result<lod::BuildReport>(const std::string& pat
 /// The store that `inputs` and `build` give, made if it is not in the cache, or not whole there. `part`: which of their
 /// stores. What another process is making is waited for. What the cache holds beyond its limit goes then, the least
 /// recently used first; what is open stays.
-Result<std::shared_ptr<const lod::Store>> openCached(const std::vector<std::string>& inputs, const BuildOptions& build,
-                                                     const std::string& part, bool showProgress,
-                                                     const StoreMaker& make);
+Result<std::shared_ptr<const lod::Store>> openCached(const std::vector<std::string>& inputs, const OpenSettings& build,
+                                                     const std::string& part, const StoreMaker& make);
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

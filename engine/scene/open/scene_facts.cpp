@@ -1,15 +1,15 @@
-#include "apps/stipple/scene_facts.h"
+#include "engine/scene/open/scene_facts.h"
 
 #include <algorithm>
 #include <map>
 #include <set>
 
-#include "apps/stipple/common.h"
 #include "engine/render/layers.h"
+#include "engine/scene/open/open_scene.h"
 #include "engine/scene/outline.h"
 #include "lod/store/surfel_weights.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 
 std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
     std::vector<render::WorldLight> lights;
@@ -142,4 +142,4 @@ bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed) {
                        [](const render::PlacedStore& p) { return lod::hasWeights(p.store->hierarchy); });
 }
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

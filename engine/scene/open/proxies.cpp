@@ -1,4 +1,4 @@
-#include "apps/stipple/proxies.h"
+#include "engine/scene/open/proxies.h"
 
 #include <fmt/format.h>
 
@@ -6,14 +6,14 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/stipple/cache.h"
+#include "engine/scene/open/cache.h"
 #include "lod/builder/curves/curve_coverage.h"
 #include "lod/builder/stochastic/stochastic_build.h"
 #include "lod/store/nearest.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 Result<Proxies> meshProxies(const scene::Scene& scene, const std::vector<scene::Placement>& of, const lod::Store& mesh,
-                            const std::string& part, const BuildOptions& build, Executor& executor, bool showProgress) {
+                            const std::string& part, const OpenSettings& build, Executor& executor) {
     constexpr uint64_t kManyTriangles = 2000, kSurfels = 200'000;
     const lod::Hierarchy& h = mesh.hierarchy;
     uint64_t coarsest = 0;
@@ -30,7 +30,8 @@ Result<Proxies> meshProxies(const scene::Scene& scene, const std::vector<scene::
         }
         for (scene::Mesh& m : only.meshes)
             std::erase_if(m.primitives, [](const auto& p) { return p.kind != scene::PrimitiveKind::triangles; });
-        STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, build.reading().memoryBytes));
+        STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images,
+                       decodeImages(scene, build.reading().memoryBytes, build.say));
         STIPPLE_ASSIGN(lod::PointSource samples, scene::sampleSurfels(only, images, {kSurfels}));
         STIPPLE_ASSIGN(lod::BuildSettings settings, build.settings());
         settings.open = [&](const std::string&, const lod::ReadOptions&) -> Result<lod::PointSource> {
@@ -39,7 +40,7 @@ Result<Proxies> meshProxies(const scene::Scene& scene, const std::vector<scene::
         return lod::buildStore({scene.path}, path, settings, executor, progress);
     };
     render::Proxy points;
-    STIPPLE_ASSIGN(points.store, openCached({scene.path}, build, part + ", proxy", showProgress, make));
+    STIPPLE_ASSIGN(points.store, openCached({scene.path}, build, part + ", proxy", make));
     STIPPLE_ASSIGN(points.error, lod::largestLeafRadius(*points.store));
     return std::make_shared<const std::vector<render::Proxy>>(std::vector{points});
 }
@@ -100,8 +101,7 @@ const lod::DiscFactors& CurveModel::factors() {
 }
 
 Result<Proxies> curveProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
-                             const std::string& part, const BuildOptions& build, Executor& executor,
-                             bool showProgress) {
+                             const std::string& part, const OpenSettings& build, Executor& executor) {
     constexpr uint64_t kFewSegments = 2000;
     const uint64_t segments = of.description.points;
     if (segments < kFewSegments) return Proxies();
@@ -116,7 +116,7 @@ Result<Proxies> curveProxies(const SharedModel& model, const lod::Store& of, con
         return lod::buildStochasticStore(items, path, settings, executor, progress);
     };
     render::Proxy proxy;
-    STIPPLE_ASSIGN(proxy.store, openCached({input}, build, part + ", proxy", showProgress, make));
+    STIPPLE_ASSIGN(proxy.store, openCached({input}, build, part + ", proxy", make));
     return std::make_shared<const std::vector<render::Proxy>>(std::vector{proxy});
 }
 
@@ -124,8 +124,8 @@ void GroupBuilder::add(const SharedModel& model, uint32_t first, uint32_t count)
     models_.push_back({model, first, count});
 }
 
-Result<void> GroupBuilder::finish(const std::string& input, const BuildOptions& build, Executor& executor,
-                                  bool showProgress, OpenedScene& scene) {
+Result<void> GroupBuilder::finish(const std::string& input, const OpenSettings& build, Executor& executor,
+                                  OpenedScene& scene) {
     constexpr uint64_t kFew = 64, kMostPoints = 12'000'000;
     constexpr uint32_t kGroupNode = 2048;  // small nodes: all of one is drawn as finely as its nearest part asks for
     uint64_t count = 0;
@@ -159,7 +159,7 @@ Result<void> GroupBuilder::finish(const std::string& input, const BuildOptions& 
         return lod::buildStochasticStore(items, path, settings, executor, progress);
     };
     render::PlacedGroup group;
-    STIPPLE_ASSIGN(group.points, openCached({input}, build, "instance group", showProgress, make));
+    STIPPLE_ASSIGN(group.points, openCached({input}, build, "instance group", make));
     const lod::Hierarchy& h = group.points->hierarchy;
     std::vector<std::vector<uint32_t>> members(h.nodes.size());
     for (const Model& m : models_)
@@ -179,4 +179,4 @@ Result<void> GroupBuilder::finish(const std::string& input, const BuildOptions& 
     return {};
 }
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

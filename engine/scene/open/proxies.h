@@ -5,19 +5,19 @@
 #include <optional>
 #include <string>
 
-#include "apps/stipple/common.h"
+#include "engine/scene/open/open_scene.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/stochastic/stochastic_build.h"
 #include "lod/primitives/curves.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 
 using Proxies = std::shared_ptr<const std::vector<render::Proxy>>;
 
 /// Of a mesh whose coarsest level still has many triangles: what is made of many small separate parts cannot be
 /// simplified as a surface. Null where it can.
 Result<Proxies> meshProxies(const scene::Scene& scene, const std::vector<scene::Placement>& of, const lod::Store& mesh,
-                            const std::string& part, const BuildOptions& build, Executor& executor, bool showProgress);
+                            const std::string& part, const OpenSettings& build, Executor& executor);
 
 /// Clean curves and their samples, made when they are needed: what is in the cache does not need them.
 class CurveModel {
@@ -39,7 +39,7 @@ using SharedModel = std::shared_ptr<CurveModel>;
 /// Of curves, which `of` holds: discs, as few as the view allows (lod/builder/stochastic). Null where there are few
 /// curves.
 Result<Proxies> curveProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
-                             const std::string& part, const BuildOptions& build, Executor& executor, bool showProgress);
+                             const std::string& part, const OpenSettings& build, Executor& executor);
 
 /// Collects what stands in many places, and makes one stochastic store of all of it.
 class GroupBuilder {
@@ -47,8 +47,7 @@ class GroupBuilder {
     /// Placed stores [first, first + count) show `model`.
     void add(const SharedModel& model, uint32_t first, uint32_t count);
     /// Adds an instance group to the scene, if there is enough of one.
-    Result<void> finish(const std::string& input, const BuildOptions& build, Executor& executor, bool showProgress,
-                        OpenedScene& scene);
+    Result<void> finish(const std::string& input, const OpenSettings& build, Executor& executor, OpenedScene& scene);
 
   private:
     struct Model {
@@ -58,4 +57,4 @@ class GroupBuilder {
     std::vector<Model> models_;
 };
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

@@ -9,7 +9,7 @@
 #include "engine/scene/scene.h"
 #include "lod/primitives/point_material.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 
 /// Of visible nodes, in world space.
 std::vector<render::WorldLight> lightsOf(const scene::Scene& scene);
@@ -35,4 +35,4 @@ bool hasMirrors(const std::vector<render::PlacedStore>& placed, const std::optio
 /// Have any surfels weights of their own (stipple build --surfel-weights)?
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed);
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

@@ -9,12 +9,13 @@
 
 #include "engine/base/progress.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 
 class BuildsOfScene {
   public:
     /// `notes`: what who opens the scene says of its file.
-    BuildsOfScene(ProgressStyle style, std::vector<std::string> notes) : progress_(style), notes_(std::move(notes)) {}
+    BuildsOfScene(ProgressStyle style, const ProgressCall& call, std::vector<std::string> notes)
+        : progress_(style, call), notes_(std::move(notes)) {}
     bool says(const std::string& note) const { return std::find(notes_.begin(), notes_.end(), note) != notes_.end(); }
     /// A part that may have to be built, and about how long that takes, in any unit.
     void expect(const std::string& part, double work) { ahead_[part] = work; }
@@ -48,4 +49,4 @@ class BuildsOfScene {
     std::string building_;
 };
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

@@ -1,4 +1,4 @@
-#include "apps/stipple/ply_meshes.h"
+#include "engine/scene/open/ply_meshes.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include "lod/import/import.h"
 #include "lod/import/ply/mesh.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 namespace fs = std::filesystem;
 
 std::string PlyMeshes::note() const {
@@ -29,7 +29,7 @@ tl::unexpected<Error> noPointsToLight(const std::string& input) {
                 "--material, --roughness, --metallic with " + input, "leave them out: its triangles have their own");
 }
 
-Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build) {
+Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const OpenSettings& build) {
     PlyMeshes out;
     if (build.onlyPoints) return out;
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs, &out.notes));
@@ -50,7 +50,7 @@ Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const Bu
 }
 
 Result<lod::BuildReport> buildPlyMeshes(const std::vector<std::string>& files, const std::string& output,
-                                        const BuildOptions& build, lod::MeshBuildSettings settings, Executor& executor,
+                                        const OpenSettings& build, lod::MeshBuildSettings settings, Executor& executor,
                                         Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings wanted, build.settings());
     const std::string folder =
@@ -70,4 +70,4 @@ Result<lod::BuildReport> buildPlyMeshes(const std::vector<std::string>& files, c
                                settings, executor, progress);
 }
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

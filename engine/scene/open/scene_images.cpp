@@ -1,28 +1,26 @@
 // The pictures of a scene file.
-#include <fmt/format.h>
-
 #include <set>
 
-#include "apps/stipple/common.h"
 #include "engine/base/text.h"
 #include "engine/image/image_io.h"
+#include "engine/scene/open/open_scene.h"
 #include "engine/scene/triangles.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 namespace {
 
 /// What a texture without a picture is: factors count alone, normals stay as they are.
 scene::DecodedImage plainImage(bool isNormalMap) { return {1, 1, {isNormalMap ? 0xffff8080u : 0xffffffffu}}; }
 
 /// (The stores of one scene are built one after the other, each with all its pictures.)
-void sayOnce(const std::string& line) {
+void sayOnce(const Say& say, const std::string& line) {
     static std::set<std::string> said;
-    if (said.insert(line).second) fmt::print(stderr, "{}\n", line);
+    if (say && said.insert(line).second) say(line);
 }
 
 }  // namespace
 
-Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene, uint64_t memoryBytes) {
+Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene, uint64_t memoryBytes, const Say& say) {
     std::vector<bool> isNormalMap(scene.images.size(), false);
     const std::vector<lod::TextureImage> kinds = scene::textureImages(scene);
     for (size_t t = 0; t < kinds.size(); ++t)
@@ -39,7 +37,7 @@ Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene,
         auto image = image::decodeImage(encoded.bytes, scene.path + ": " + encoded.name, left);
         if (!image && image.error().kind == ErrorKind::budget) return tl::unexpected(image.error());
         if (!image) {
-            sayOnce("note: a texture is left out: " + printable(image.error().line()));
+            sayOnce(say, "note: a texture is left out: " + printable(image.error().line()));
             images.push_back(plainImage(isNormalMap[i]));
             continue;
         }
@@ -49,4 +47,4 @@ Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene,
     return images;
 }
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

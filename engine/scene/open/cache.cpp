@@ -1,4 +1,4 @@
-#include "apps/stipple/cache.h"
+#include "engine/scene/open/cache.h"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -7,18 +7,18 @@
 #include <filesystem>
 #include <map>
 
-#include "apps/stipple/builds_of_scene.h"
-#include "apps/stipple/cache_folder.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
+#include "engine/scene/open/builds_of_scene.h"
+#include "engine/scene/open/cache_folder.h"
 #include "engine/scene/scene_files.h"
 #include "lod/builder/build_version.h"
 #include "lod/builder/octree/journal.h"
 #include "lod/import/import.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 namespace fs = std::filesystem;
 using StorePtr = std::shared_ptr<const lod::Store>;
 
@@ -26,12 +26,12 @@ namespace {
 
 /// Of everything that decides what a build gives. A new option does not compile until it is named here: does it change
 /// the bytes?
-std::string settingsText(const BuildOptions& build) {
+std::string settingsText(const OpenSettings& build) {
     const auto& [memory, normals, radii, up, attributes, temp, duplicates, cacheLimit, threads, skipBad, onlyPoints,
-                 allowOutside, dropOutliers, surfelWeights, patches, repair, curveRadius, surfels, progress, ranks,
-                 material, together, leftovers] = build;
-    // Not patches, which are of `stipple build` alone. Not memory, temp, threads, ranks, together, leftovers: any give
-    // the same. Not attributes: what is cached has all of them.
+                 allowOutside, dropOutliers, surfelWeights, curveRadius, surfels, ranks, material, together, leftovers,
+                 told, progressStyle, onProgress] = build;
+    // Not memory, temp, threads, ranks, together, leftovers, and who is told: any give the same. Not attributes: what
+    // is cached has all of them.
     const std::string of = material ? "|" + lod::identityOf(*material) : std::string();
     return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}{}{}", normals, radii, up, duplicates, skipBad, onlyPoints,
                        allowOutside, dropOutliers, curveRadius, surfels, of, surfelWeights ? "|weights" : "");
@@ -67,7 +67,7 @@ std::string identityOfScene(const std::string& path) {
     return own.identity;
 }
 
-Result<std::string> keyOf(const std::vector<std::string>& inputs, const BuildOptions& build, const std::string& part,
+Result<std::string> keyOf(const std::vector<std::string>& inputs, const OpenSettings& build, const std::string& part,
                           std::vector<std::string>& notes) {
     std::string text = fmt::format("{}|{}|{}|{}|{}", part, settingsText(build), STIPPLE_VERSION, lod::kStoreVersion,
                                    lod::kBuildVersion);
@@ -87,14 +87,13 @@ class Lookup {
   public:
     /// `notes`: on the inputs, before any build.
     Lookup(const CacheFolder& cache, std::string key, std::vector<std::string> notes,
-           const std::vector<std::string>& inputs, std::string part, const BuildOptions& build, bool isLoud)
+           const std::vector<std::string>& inputs, std::string part, const OpenSettings& build)
         : cache_(cache),
           key_(std::move(key)),
           notes_(std::move(notes)),
           inputs_(inputs),
           part_(std::move(part)),
           build_(build),
-          isLoud_(isLoud),
           path_(cache.storePath(key_)) {}
 
     Result<StorePtr> open(const StoreMaker& make) {
@@ -102,19 +101,18 @@ class Lookup {
         sayNotes(notes_);
         STIPPLE_TRY(cache_.use(key_));
         if (Result<StorePtr> found = openWhole(); found) return found;
-        STIPPLE_TRY(cache_.lockBuild(key_, [&] { say("is being built by another process: waiting for it"); }));
+        STIPPLE_TRY(cache_.lockBuild(key_, [&] { tell("is being built by another process: waiting for it"); }));
         Result<StorePtr> store = openOrBuild(make, limit);
         cache_.unlockBuild(key_);
         return store;
     }
 
   private:
-    void say(const std::string& what) const {
-        if (isLoud_) fmt::print(stderr, "{} ({}): {}\n", printable(inputs_.front()), part_, printable(what));
+    void tell(const std::string& what) const {
+        say(build_, fmt::format("{} ({}): {}", printable(inputs_.front()), part_, printable(what)));
     }
     void sayNotes(const std::vector<std::string>& notes) const {
-        for (const std::string& note : notes)
-            if (isLoud_) fmt::print(stderr, "note: {}\n", printable(note));
+        for (const std::string& note : notes) say(build_, "note: " + printable(note));
     }
 
     /// What is there, if it is whole.
@@ -130,9 +128,8 @@ class Lookup {
         if (std::error_code error; fs::exists(path_, error)) {
             Result<StorePtr> store = openWhole();  // another process was faster
             if (store) return store;
-            if (isLoud_)
-                fmt::print(stderr, "note: the scene in the cache cannot be used and is built again: {}\n",
-                           printable(store.error().line()));
+            say(build_,
+                "note: the scene in the cache cannot be used and is built again: " + printable(store.error().line()));
             cache_.removeStore(key_);
         }
         CacheRecord record{absolute(), part_, {}, std::chrono::system_clock::now()};
@@ -149,17 +146,16 @@ class Lookup {
         for (const auto& [reason, count] : built.dropped)
             record.notes.push_back(fmt::format("dropped {}: {}", count, reason));
         cache_.writeRecord(key_, record);
-        say(fmt::format("built into the cache in {:.1f} s ({})", built.seconds, path_));
+        tell(fmt::format("built into the cache in {:.1f} s ({})", built.seconds, path_));
         sayNotes(record.notes);
         STIPPLE_ASSIGN(StorePtr store, openStoreFile(path_));
         uint64_t bytes = 0;
         const std::vector<CacheEntry> removed = cache_.shrinkTo(limit);
         for (const CacheEntry& entry : removed) bytes += entry.bytes;
-        if (!removed.empty() && isLoud_)
-            fmt::print(stderr,
-                       "note: {} scenes used least recently, {}, went from the cache, whose limit is {} "
-                       "(--cache-limit, STIPPLE_CACHE_LIMIT; see stipple cache list)\n",
-                       removed.size(), humanBytes(bytes), humanBytes(limit));
+        if (!removed.empty())
+            say(build_, fmt::format("note: {} scenes used least recently, {}, went from the cache, whose limit is {} "
+                                    "(--cache-limit, STIPPLE_CACHE_LIMIT; see stipple cache list)",
+                                    removed.size(), humanBytes(bytes), humanBytes(limit)));
         return store;
     }
 
@@ -190,7 +186,7 @@ class Lookup {
             build_.together->settle(part_);
             return built;
         }
-        Progress progress(build_.progressStyle(!isLoud_));
+        Progress progress(build_.progressStyle, build_.onProgress);
         return make(path_, progress);
     }
 
@@ -226,8 +222,7 @@ class Lookup {
     const std::vector<std::string> notes_;
     const std::vector<std::string>& inputs_;
     const std::string part_;
-    const BuildOptions& build_;
-    const bool isLoud_;
+    const OpenSettings& build_;
     const std::string path_;
 };
 
@@ -238,14 +233,14 @@ Result<StorePtr> openStoreFile(const std::string& path) {
     return std::make_shared<const lod::Store>(std::move(store));
 }
 
-Result<StorePtr> openCached(const std::vector<std::string>& inputs, const BuildOptions& build, const std::string& part,
-                            bool showProgress, const StoreMaker& make) {
+Result<StorePtr> openCached(const std::vector<std::string>& inputs, const OpenSettings& build, const std::string& part,
+                            const StoreMaker& make) {
     std::vector<std::string> notes;
     STIPPLE_ASSIGN(const std::string key, keyOf(inputs, build, part, notes));
     STIPPLE_ASSIGN(const CacheFolder* const cache, folder());
-    Result<StorePtr> store = Lookup(*cache, key, std::move(notes), inputs, part, build, showProgress).open(make);
+    Result<StorePtr> store = Lookup(*cache, key, std::move(notes), inputs, part, build).open(make);
     if (build.together) build.together->settle(part);
     return store;
 }
 
-}  // namespace stipple::app
+}  // namespace stipple::scene

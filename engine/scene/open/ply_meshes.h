@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "apps/stipple/common.h"
+#include "engine/scene/open/open_scene.h"
 #include "lod/builder/mesh/mesh_build.h"
 
-namespace stipple::app {
+namespace stipple::scene {
 
 /// What some inputs hold, as files.
 struct PlyMeshes {
@@ -23,11 +23,11 @@ struct PlyMeshes {
 tl::unexpected<Error> nothingToSample(const std::string& input);
 /// What --material is told where there are no points.
 tl::unexpected<Error> noPointsToLight(const std::string& input);
-Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build);
+Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const OpenSettings& build);
 
 /// The triangles of all `files` in one store. `settings`: without limits and source.
 Result<lod::BuildReport> buildPlyMeshes(const std::vector<std::string>& files, const std::string& output,
-                                        const BuildOptions& build, lod::MeshBuildSettings settings, Executor& executor,
+                                        const OpenSettings& build, lod::MeshBuildSettings settings, Executor& executor,
                                         Progress& progress);
 
-}  // namespace stipple::app
+}  // namespace stipple::scene
