@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "apps/stipple/build_patches.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/mpi_ranks.h"
+#include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"

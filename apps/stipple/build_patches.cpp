@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
+#include "apps/stipple/options.h"
 #include "engine/base/hash.h"
 #include "engine/base/words.h"
 #include "engine/scene/open/ply_meshes.h"

@@ -1,6 +1,7 @@
 // `stipple build --patches`: stores of elevation patches.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

@@ -3,8 +3,10 @@
 
 #include <ctime>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/options.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"

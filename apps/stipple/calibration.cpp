@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "apps/stipple/options.h"
 #include "apps/study/calibration/curve.h"
 #include "apps/study/machine.h"
 #include "apps/study/statistics/intervals.h"

@@ -1,7 +1,6 @@
 // What frames cost here (`stipple study SCENE --calibrate`), and errors chosen by it (`--target-ms`, `--target-error`).
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <span>
 #include <string>
@@ -9,6 +8,10 @@
 #include "apps/stipple/common.h"
 #include "apps/study/sweep/plan.h"
 #include "engine/render/frame.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace stipple::app {
 

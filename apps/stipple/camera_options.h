@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <vector>
+#include "apps/stipple/options.h"
 
 #include "apps/stipple/common.h"
 

@@ -20,6 +20,7 @@
 #include "lod/store/colour.h"
 #include "lod/store/file_kind.h"
 #ifdef STIPPLE_WITH_GPU
+#include "apps/stipple/options.h"
 #include "engine/gpu/gpu_backend.h"
 #endif
 

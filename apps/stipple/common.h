@@ -1,13 +1,11 @@
 // What the subcommands share: options, backends, scenes from any input, errors to exit codes.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "apps/stipple/options.h"
 #include "apps/stipple/report.h"
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
@@ -17,6 +15,10 @@
 #include "engine/scene/open/open_scene.h"
 #include "lod/builder/build.h"
 #include "lod/store/store.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace stipple::app {
 

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"

@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "apps/stipple/common.h"
 #include "apps/stipple/convert_patches.h"
+#include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/scene/curve_fit.h"

@@ -7,9 +7,11 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "apps/stipple/build_patches.h"
+#include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/base/words.h"

@@ -1,6 +1,7 @@
 #include "apps/stipple/effect_options.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/stipple/options.h"
 #include "engine/base/process.h"

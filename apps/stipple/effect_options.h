@@ -1,13 +1,16 @@
 // Which effects are drawn, on the command line: --effects and --set.
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "engine/render/effect_status.h"
 #include "engine/render/effects/request.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace stipple::app {
 

@@ -1,4 +1,5 @@
 #include "apps/stipple/exposure_options.h"
+#include "apps/stipple/options.h"
 
 #include <fmt/format.h>
 

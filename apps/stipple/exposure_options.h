@@ -1,10 +1,12 @@
 // How long and through what a picture is exposed: the frames whose mean it is.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
 #include "apps/stipple/camera_options.h"
 #include "engine/render/accumulation.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace stipple::app {
 

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "apps/grow/landscapes.h"
 #include "apps/grow/meshes.h"
 #include "apps/grow/plants.h"
 #include "apps/stipple/common.h"
+#include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"

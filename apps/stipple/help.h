@@ -1,9 +1,13 @@
 // How --help looks, and the topics of `stipple help`.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+
+namespace CLI {
+class App;
+class FormatterBase;
+}  // namespace CLI
 
 namespace stipple::app {
 

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "apps/stipple/build_patches.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/info_input.h"
+#include "apps/stipple/options.h"
 #include "engine/base/hash.h"
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"

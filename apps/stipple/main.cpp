@@ -10,6 +10,7 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/exhaustion.h"
 #include "apps/stipple/help.h"
+#include "apps/stipple/options.h"
 #include "apps/stipple/usage.h"
 
 namespace {

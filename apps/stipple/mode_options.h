@@ -1,12 +1,15 @@
 // How points become a picture, on the command line, and the options that only some of the modes use.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "engine/base/result.h"
 #include "engine/render/frame.h"
 #include "engine/render/reconstructions/table.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace stipple::app {
 

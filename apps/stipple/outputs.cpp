@@ -7,9 +7,11 @@
 #include <array>
 #include <compare>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
 
+#include "apps/stipple/options.h"
 #include "engine/base/file.h"
 #include "engine/scene/gltf/container.h"
 #include "engine/scene/scene_files.h"

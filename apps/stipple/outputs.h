@@ -2,11 +2,14 @@
 // nothing else is destroyed unasked.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 #include "engine/base/result.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace stipple::app {
 

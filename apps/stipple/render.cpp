@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "apps/stipple/calibration.h"
@@ -13,6 +14,7 @@
 #include "apps/stipple/exposure_options.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/mode_options.h"
+#include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/render_frames.h"
 #include "apps/stipple/sun_options.h"

@@ -1,7 +1,7 @@
 // What the program answers: errors as a line (and as JSON where that is asked for) and results as JSON with a schema.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "engine/base/result.h"

@@ -6,8 +6,10 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/options.h"
 #include "engine/base/process.h"
 #include "engine/base/progress.h"
 

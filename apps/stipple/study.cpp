@@ -2,8 +2,10 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/options.h"
 #include "apps/stipple/study_scenes.h"
 #include "apps/study/study.h"
 #include "engine/base/process.h"

@@ -6,10 +6,12 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/mode_options.h"
+#include "apps/stipple/options.h"
 #include "apps/study/sweep/paths.h"
 #include "apps/study/sweep/report.h"
 #include "engine/base/file.h"

@@ -1,12 +1,15 @@
 // A sun that stands somewhere and casts shadows, on the command line.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <glm/glm.hpp>
 #include <string>
 
 #include "engine/base/result.h"
 #include "engine/render/draw_list.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace stipple::app {
 

@@ -1,11 +1,15 @@
 // Arguments that cannot be understood, in our own words; and what the program does with what is no command.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 #include "engine/base/result.h"
+
+namespace CLI {
+class App;
+class ParseError;
+}  // namespace CLI
 
 namespace stipple::app {
 

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
 #include "apps/stipple/render_frames.h"

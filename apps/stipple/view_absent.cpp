@@ -1,5 +1,6 @@
 // Without Vulkan there is no window: the command exists and says so.
 #include "apps/stipple/common.h"
+#include "apps/stipple/options.h"
 
 namespace stipple::app {
 
