@@ -127,11 +127,6 @@ Result<std::optional<scene::CameraPath>> makePath(const CameraOptions& o, const 
     return std::optional<scene::CameraPath>();
 }
 
-double nearPlaneOf(const OpenedScene& opened) {
-    // Only what no double can tell from the eye: each frame finds its own from what is around the eye.
-    return std::max(1e-300, 1e-15 * glm::length(opened.description.boundsMax - opened.description.boundsMin));
-}
-
 namespace {
 
 /// The far plane of an orthographic camera cuts nothing off.
@@ -156,7 +151,7 @@ lod::View Shot::viewAfter(size_t index, double later) const {
 Result<Shot> makeShot(const CameraOptions& o, int frames, const OpenedScene& opened, const glm::uvec2& size) {
     Shot shot;
     shot.worldUp = opened.description.up;
-    const double aspect = static_cast<double>(size.x) / size.y, nearPlane = nearPlaneOf(opened);
+    const double aspect = static_cast<double>(size.x) / size.y, nearPlane = scene::nearPlaneOf(opened);
     STIPPLE_ASSIGN(shot.path, makePath(o, opened, aspect));
     const std::optional<scene::CameraPath>& path = shot.path;
     if (!path) {

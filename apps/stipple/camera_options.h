@@ -34,8 +34,6 @@ struct Shot {
 Result<scene::Camera> makeCamera(const CameraOptions& o, const OpenedScene& opened, double aspect);
 /// The camera path that is asked for, an orbit included; nothing if there is none.
 Result<std::optional<scene::CameraPath>> makePath(const CameraOptions& o, const OpenedScene& opened, double aspect);
-/// Distance before which nothing is drawn, world units.
-double nearPlaneOf(const OpenedScene& opened);
 /// All views. `frames`: of a camera path; 1: as many as its duration and rate say.
 Result<Shot> makeShot(const CameraOptions& o, int frames, const OpenedScene& opened, const glm::uvec2& size);
 

@@ -13,9 +13,7 @@
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
-#include "engine/cpu/cpu_backend.h"
 #include "engine/image/image_io.h"
-#include "engine/reference/reference.h"
 #include "lod/import/import.h"
 #include "lod/store/colour.h"
 #include "lod/store/file_kind.h"
@@ -162,57 +160,12 @@ void ColourOptions::addTo(CLI::App& app) {
     app.add_flag("--legend", legend, "draw what the colours stand for into the picture");
 }
 
-bool isLit(const std::string& shade, const lod::StoreDescription& d, const lod::ColourBy& colour) {
-    if (shade != "auto") return shade == "lit";
-    if (colour.mode == lod::ColourMode::own) return scene::isShaded(d);
-    return colour.mode == lod::ColourMode::height || colour.isCategorical;
-}
-
 void EnvironmentOptions::addTo(CLI::App& app) {
     app.add_option("--environment", path, "HDR picture all around (.hdr, .exr; equirectangular) that lights the scene")
         ->type_name("FILE");
     app.add_option("--environment-scale", scale, "factor of its light")
         ->transform(within(0.0, 1e6))
         ->capture_default_str();
-}
-
-Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor) {
-    if (device == "cpu") return cpu::makeCpuBackend(executor);
-    if (device == "reference") return reference::makeReferenceBackend(executor);
-#ifdef STIPPLE_WITH_GPU
-    if (device == "auto") {
-        // A real GPU if there is one; software Vulkan only when asked for.
-        if (gpu::hasHardwareDevice()) {
-            auto backend = gpu::makeGpuBackend({});
-            if (backend) return backend;
-        }
-        return cpu::makeCpuBackend(executor);
-    }
-    if (device == "gpu" || device.rfind("gpu:", 0) == 0) {
-        gpu::GpuSettings settings;
-        settings.deviceName = device.size() > 4 ? device.substr(4) : "";
-        settings.validation = std::getenv("STIPPLE_VALIDATION") != nullptr;
-        return gpu::makeGpuBackend(settings);
-    }
-#else
-    if (device == "auto") return cpu::makeCpuBackend(executor);
-    if (device.rfind("gpu", 0) == 0)
-        return fail(ErrorKind::device, "this program was built without Vulkan", "--device " + device,
-                    "use --device cpu");
-#endif
-    return fail(ErrorKind::usage, fmt::format("'{}' is not a device", device), "--device",
-                "auto, cpu, gpu, gpu:NAME or reference");
-}
-
-std::string listDevices() {
-    const auto executor = makeTbbExecutor(0);
-    std::string text = "  cpu        " + cpu::makeCpuBackend(*executor)->device() + "\n";
-#ifdef STIPPLE_WITH_GPU
-    for (const std::string& name : gpu::deviceNames()) text += "  gpu        " + name + "\n";
-#else
-    text += "  gpu        not built in\n";
-#endif
-    return text + "  reference  fp64, scalar, slow: the oracle of the tests\n";
 }
 
 Result<glm::dvec3> parseVector(const std::string& text, const char* option) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/stipple/report.h"
+#include "engine/api/devices.h"
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
 #include "engine/render/backend.h"
@@ -75,14 +76,6 @@ struct EnvironmentOptions {
     double scale = 1;
     void addTo(CLI::App& app);
 };
-
-/// What `--shade` (auto, lit, unlit) means for points that are coloured like this. Auto: lit, unless a scan has its own
-/// colours; of colours that stand for values, heights and categories, which stay what they are when lit.
-bool isLit(const std::string& shade, const lod::StoreDescription& d, const lod::ColourBy& colour);
-
-Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor);
-/// Every backend and device, one per line.
-std::string listDevices();
 
 Result<glm::dvec3> parseVector(const std::string& text, const char* option);
 Result<glm::uvec2> parseSize(const std::string& text);

@@ -104,7 +104,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.budgets.errorPixels = o.error;
     if (o.budget > 0) s.budgets.records = o.budget;
     s.draw.unlitTriangles = o.shade == "unlit";
-    s.draw.lit = isLit(o.shade, d, colour);
+    s.draw.lit = scene::isLit(o.shade, d, colour);
     if (const auto material = o.material.material()) {
         s.draw.pointMaterial = lod::packed(*material);
         s.draw.optics = material->optics;

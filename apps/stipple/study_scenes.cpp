@@ -113,10 +113,10 @@ Result<study::StudyScene> studySceneOf(const std::string& input, const StudyOpti
     if (!scene::isSceneFile(input) && scene::hasPoints(opened.placed)) s.source = input;
     s.hash = sceneHash(opened);
     s.draw.lights = opened.lights;
-    s.draw.lit = isLit("auto", opened.description, colour);
+    s.draw.lit = scene::isLit("auto", opened.description, colour);
     s.draw.worldUp = opened.description.up;
     s.up = opened.description.up;
-    s.nearPlane = nearPlaneOf(opened);
+    s.nearPlane = scene::nearPlaneOf(opened);
     s.outline = opened.outline;
     std::vector<const lod::Store*> seen;
     for (const render::PlacedStore& p : opened.placed)

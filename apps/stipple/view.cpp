@@ -204,7 +204,7 @@ class Viewer {
 
     lod::View view() const {
         return scene::makeView(player_.isPlaying() ? player_.camera() : navigation_.camera(), std::max(1u, width_),
-                               std::max(1u, height_), nearPlaneOf(session_.scene()));
+                               std::max(1u, height_), scene::nearPlaneOf(session_.scene()));
     }
 
     Result<bool> present(const gpu::Input& input, render::Image* capture) {
@@ -479,7 +479,7 @@ Result<void> run(const ViewOptions& o) {
     const double aspect = static_cast<double>(size.x) / size.y;
     if (o.target.isAny()) {
         STIPPLE_ASSIGN(const scene::Camera first, makeCamera(o.camera, session.scene(), aspect));
-        const std::array views{scene::makeView(first, size.x, size.y, nearPlaneOf(session.scene()))};
+        const std::array views{scene::makeView(first, size.x, size.y, scene::nearPlaneOf(session.scene()))};
         const CutLoads loads{session.state(), frame.budgets, views};
         STIPPLE_ASSIGN(const Chosen chosen, chooseError(o.target, loads, o.drawn.mode, hash, *executor));
         frame.budgets.errorPixels = chosen.errorPixels;

@@ -28,7 +28,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     settings.draw.worldUp = d.up;
     settings.draw.wind.towards = render::windAcross(d.up);
     settings.draw.unlitTriangles = options_.shade == "unlit";
-    settings.draw.lit = isLit(options_.shade, d, colour_);
+    settings.draw.lit = scene::isLit(options_.shade, d, colour_);
     options_.sun.applyTo(settings.draw);
     if (const auto material = options_.material.material()) {
         settings.draw.pointMaterial = lod::packed(*material);

@@ -31,11 +31,22 @@ struct Module {
     std::string problem;
 };
 
-/// Beside the program (build tree), in lib/stipple of an installation, or where the build put it (tests).
-std::array<std::string, 3> modulePlaces() {
+/// Of the program, or of libstipple.so in somebody else's.
+std::filesystem::path folderOfThisCode() {
+    Dl_info info{};
+    std::error_code ignored;
+    if (::dladdr(reinterpret_cast<const void*>(&folderOfThisCode), &info) == 0 || info.dli_fname == nullptr) return {};
+    return std::filesystem::canonical(info.dli_fname, ignored).parent_path();
+}
+
+/// Beside the program (build tree), in lib/stipple of an installation, beside the library, or where the build put it
+/// (tests).
+std::array<std::string, 5> modulePlaces() {
     std::error_code ignored;
     const auto folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
+    const auto library = folderOfThisCode();
     return {(folder / "libstipple_oiio.so").string(), (folder / STIPPLE_INSTALLED_MODULE).string(),
+            (library / "stipple" / "libstipple_oiio.so").string(), (library / "libstipple_oiio.so").string(),
             STIPPLE_BUILT_MODULE};
 }
 
@@ -85,7 +96,7 @@ Result<void> checkModule(bool load) {
         return fail(ErrorKind::output, "the picture module cannot be loaded: " + why, "",
                     "install the program anew, with the packages that it names");
     };
-    const std::array<std::string, 3> places = modulePlaces();
+    const std::array<std::string, 5> places = modulePlaces();
     std::error_code ignored;
     if (std::none_of(places.begin(), places.end(), [&](const auto& p) { return std::filesystem::exists(p, ignored); }))
         return missing(places[0] + " is not there");
@@ -103,7 +114,10 @@ Result<std::vector<char>> encodeImage(const std::string& path, const render::Ima
     STIPPLE_TRY(checkImagePath(path));
     const bool isExr = hasExtension(path, ".exr");
     if (!isExr && transfer == Transfer::rec709) {
-        render::Image encoded{image.width, image.height, image.rgba};
+        render::Image encoded;
+        encoded.width = image.width;
+        encoded.height = image.height;
+        encoded.rgba = image.rgba;
         encodeRec709(encoded);
         STIPPLE_ASSIGN(std::vector<char> bytes, encodeImage(path, encoded, Transfer::srgb));
         tagRec709(bytes);

@@ -29,7 +29,7 @@ namespace {
 std::string settingsText(const OpenSettings& build) {
     const auto& [memory, normals, radii, up, attributes, temp, duplicates, cacheLimit, threads, skipBad, onlyPoints,
                  allowOutside, dropOutliers, surfelWeights, curveRadius, surfels, ranks, material, together, leftovers,
-                 told, progressStyle, onProgress] = build;
+                 isStopped, told, progressStyle, onProgress] = build;
     // Not memory, temp, threads, ranks, together, leftovers, and who is told: any give the same. Not attributes: what
     // is cached has all of them.
     const std::string of = material ? "|" + lod::identityOf(*material) : std::string();

@@ -8,6 +8,12 @@
 #include "engine/scene/open/open_scene.h"
 
 namespace stipple::scene {
+bool isLit(const std::string& shade, const lod::StoreDescription& d, const lod::ColourBy& colour) {
+    if (shade != "auto") return shade == "lit";
+    if (colour.mode == lod::ColourMode::own) return isShaded(d);
+    return colour.mode == lod::ColourMode::height || colour.isCategorical;
+}
+
 namespace {
 
 /// Heights of a placed store along the scene's up, in the store's own units: of all stores together, unless `isGiven`.

@@ -448,6 +448,11 @@ Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::strin
 
 }  // namespace
 
+double nearPlaneOf(const OpenedScene& opened) {
+    // Only what no double can tell from the eye: each frame finds its own from what is around the eye.
+    return std::max(1e-300, 1e-15 * glm::length(opened.description.boundsMax - opened.description.boundsMin));
+}
+
 void turnUp(OpenedScene& scene, lod::UpAxis up) { scene.description.up = lod::axisVector(up); }
 
 Result<void> checkInputs(const std::vector<std::string>& inputs) {

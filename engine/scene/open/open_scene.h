@@ -50,8 +50,15 @@ Result<void> checkInputs(const std::vector<std::string>& inputs);
 /// and the meshes of a scene, are built into the cache first (and found there the next time), with all attributes.
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const OpenSettings& build, Executor& executor);
 
+/// Distance before which nothing is drawn, world units.
+double nearPlaneOf(const OpenedScene& opened);
+
 /// Needs light to be seen: it has no photographed colours of its own.
 inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.isReflectance; }
+
+/// What `--shade` (auto, lit, unlit) means for points that are coloured like this. Auto: lit, unless a scan has its own
+/// colours; of colours that stand for values, heights and categories, which stay what they are when lit.
+bool isLit(const std::string& shade, const lod::StoreDescription& d, const lod::ColourBy& colour);
 
 /// Gives every store its colours; one that does not have what is asked for keeps its own. An error if none has it. The
 /// result is for the legend. `what`, `map`, `range`: as lod::parseColourBy has them.

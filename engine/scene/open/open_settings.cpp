@@ -45,7 +45,7 @@ Result<lod::BuildSettings> OpenSettings::settings() const {
     s.mergeDuplicates = duplicates == "merge";
     s.dropOutliers = dropOutliers;
     s.tempFolder = temp;
-    s.isStopped = isStopRequested;
+    s.isStopped = isStopped;
     s.ranks = ranks;
     s.leftovers = leftovers;
     s.estimateRadii = radii != "keep";

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "engine/base/process.h"
 #include "engine/base/progress.h"
 #include "engine/base/result.h"
 #include "engine/scene/read_settings.h"
@@ -31,6 +32,7 @@ struct OpenSettings {
     std::optional<lod::PointMaterial> material;  ///< of stores of points that are built to a file
     std::shared_ptr<BuildsOfScene> together;     ///< of the scene that is opened: its builds show one progress
     lod::Leftovers leftovers = lod::Leftovers::goOn;
+    std::function<bool()> isStopped = isStopRequested;  ///< of builds
     Say say;
     ProgressStyle progressStyle = ProgressStyle::silent;
     ProgressCall onProgress;  ///< beside that

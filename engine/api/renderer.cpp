@@ -1,0 +1,198 @@
+// Devices, and pictures on them.
+#include <cmath>
+#include <cstring>
+
+#include "engine/api/devices.h"
+#include "engine/api/held.h"
+#include "engine/image/coverage.h"
+#include "engine/render/draw_list.h"
+#include "engine/render/frame.h"
+#include "engine/render/reconstructions/table.h"
+#include "engine/scene/open/scene_facts.h"
+
+namespace stipple::v1 {
+
+Result<Device> Device::open(const std::string& name, unsigned threads) {
+    auto held = std::make_shared<Held>();
+    held->executor = makeTbbExecutor(static_cast<int>(threads));
+    auto backend = makeBackend(name, *held->executor);
+    if (!backend) return given(backend.error());
+    held->backend = std::move(*backend);
+    return Device(std::move(held));
+}
+
+std::string Device::name() const { return held_->backend->device(); }
+
+struct Renderer::Held {
+    std::shared_ptr<Device::Held> device;  // ends last
+    scene::OpenedScene scene;
+    lod::ColourBy colour;
+    std::unique_ptr<render::FrameState> state;
+    FrameInfo info;
+    ~Held();
+};
+
+namespace {
+
+/// A device is one thread's for as long as this lives.
+class Turn {
+  public:
+    explicit Turn(Device::Held& of) : of_(of), isMine_(!of.isBusy.test_and_set(std::memory_order_acquire)) {}
+    ~Turn() {
+        if (!isMine_) return;
+        of_.isBusy.clear(std::memory_order_release);
+        of_.isBusy.notify_one();
+    }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+    explicit operator bool() const { return isMine_; }
+
+  private:
+    Device::Held& of_;
+    const bool isMine_;
+};
+
+Error busy() {
+    return {ErrorKind::usage, "draws for another thread", "device", "one thread at a time may draw on a device"};
+}
+
+::stipple::Result<render::FrameSettings> settingsOf(const RenderSettings& s, const scene::OpenedScene& scene,
+                                                    const lod::ColourBy& colour) {
+    render::FrameSettings out;
+    const auto refuse = [](const std::string& what, const char* where) {
+        return fail(::stipple::ErrorKind::usage, what, where);
+    };
+    const render::Reconstruction* mode = render::reconstructionNamed(s.mode);
+    if (mode == nullptr) return refuse("there is no mode '" + s.mode + "'", "mode");
+    if (!(s.errorPixels > 0) || !std::isfinite(s.errorPixels)) return refuse("must be above 0", "errorPixels");
+    if (s.shade != "auto" && s.shade != "lit" && s.shade != "unlit")
+        return refuse("is auto, lit or unlit, and not '" + s.shade + "'", "shade");
+    if (!(s.windShare >= 0 && s.windShare <= 0.5)) return refuse("is 0 to 0.5", "windShare");
+    out.mode = mode->mode;
+    out.budgets.errorPixels = s.errorPixels;
+    if (s.budgetRecords > 0) out.budgets.records = s.budgetRecords;
+    out.wantDepthAndNormal = s.wantDepthAndNormal;
+    render::DrawSettings& draw = out.draw;
+    draw.lights = scene.lights;
+    draw.unlitTriangles = s.shade == "unlit";
+    draw.lit = scene::isLit(s.shade, scene.description, colour);
+    draw.worldUp = scene.description.up;
+    draw.wind = {s.windShare, s.seconds, render::windAcross(draw.worldUp)};
+    for (int c = 0; c < 3; ++c)
+        draw.background[c] =
+            shared::linearFromSrgb(static_cast<float>(s.background.at(static_cast<size_t>(c))) / 255.0f);
+    const render::EffectWishes wishes{s.effects, s.effectValues};
+    STIPPLE_TRY(render::checkWishes(wishes));
+    STIPPLE_TRY(
+        render::requestEffects(wishes, scene.effects, render::factsOf(scene::storesOf(scene.placed), draw), draw));
+    return out;
+}
+
+void give(const render::Image& from, Image& to) {
+    to.width = from.width;
+    to.height = from.height;
+    to.rgba.resize(4 * from.rgba.size());
+    std::memcpy(to.rgba.data(), from.rgba.data(), to.rgba.size());  // the first byte is red
+    to.depth = from.depth;
+    to.normal = from.normal;
+    to.linear = from.linear;
+}
+
+FrameInfo infoOf(const FrameCounters& c) {
+    FrameInfo info;
+    info.isComplete = c.nodesMissing == 0 && !c.budgetTruncated;
+    info.errorPixels = c.tauEffectivePixels;
+    info.records = c.recordsDrawn;
+    info.triangles = c.trianglesDrawn;
+    info.nodes = c.nodesDrawn;
+    info.residentBytes = c.residentBytes;
+    info.milliseconds = c.frameMs;
+    return info;
+}
+
+/// `waits`: until nothing is missing.
+::stipple::Result<void> draw(Renderer::Held& r, const Camera& camera, uint32_t width, uint32_t height,
+                             const RenderSettings& settings, bool waits) {
+    constexpr uint32_t kLargest = 16384;
+    if (width == 0 || height == 0 || width > kLargest || height > kLargest)
+        return fail(::stipple::ErrorKind::usage, "is not a size from 1x1 to 16384x16384",
+                    std::to_string(width) + "x" + std::to_string(height));
+    STIPPLE_ASSIGN(const scene::Camera eye, taken(camera));
+    STIPPLE_ASSIGN(const render::FrameSettings frame, settingsOf(settings, r.scene, r.colour));
+    render::setSway(frame.draw.wind, r.state->hierarchies, r.state->instances, r.state->groups);
+    const lod::View view = scene::makeView(eye, width, height, scene::nearPlaneOf(r.scene));
+    if (waits) {
+        STIPPLE_TRY(render::renderUntilComplete(*r.state, view, frame));
+    } else {
+        STIPPLE_TRY(render::renderFrame(*r.state, view, frame));
+    }
+    r.info = infoOf(r.state->counters);
+    return {};
+}
+
+}  // namespace
+
+/// What it keeps on the device goes: not while somebody draws there, whose frame ends soon.
+Renderer::Held::~Held() {
+    for (;;) {
+        const Turn mine(*device);
+        if (mine) {
+            state.reset();
+            return;
+        }
+        device->isBusy.wait(true);
+    }
+}
+
+Renderer::Renderer(std::unique_ptr<Held> held) : held_(std::move(held)) {}
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+Renderer::~Renderer() = default;
+
+Result<Renderer> Renderer::create(const Device& device, const Scene& scene, uint64_t residentBytes) {
+    const Turn mine(*device.held_);
+    if (!mine) return busy();
+    auto held = std::make_unique<Held>();
+    held->device = device.held_;
+    held->scene = scene.held_->opened;
+    held->colour = scene.held_->colour;
+    streaming::StreamSettings streams;
+    streams.residentBytes = residentBytes;
+    held->state = render::makeFrameState(held->scene.placed, *held->device->backend, *held->device->executor, streams,
+                                         held->scene.groups);
+    return Renderer(std::move(held));
+}
+
+Result<Image> Renderer::render(const Camera& camera, uint32_t width, uint32_t height, const RenderSettings& settings) {
+    Image image;
+    if (!held_) return Error{ErrorKind::usage, "was moved from", "renderer", ""};
+    const Turn mine(*held_->device);
+    if (!mine) return busy();
+    if (const auto drawn = draw(*held_, camera, width, height, settings, true); !drawn) return given(drawn.error());
+    give(held_->state->image, image);
+    return image;
+}
+
+Result<FrameInfo> Renderer::renderFrame(const Camera& camera, uint32_t width, uint32_t height, Image& image,
+                                        const RenderSettings& settings) {
+    if (!held_) return Error{ErrorKind::usage, "was moved from", "renderer", ""};
+    const Turn mine(*held_->device);
+    if (!mine) return busy();
+    if (const auto drawn = draw(*held_, camera, width, height, settings, false); !drawn) return given(drawn.error());
+    give(held_->state->image, image);
+    return held_->info;
+}
+
+FrameInfo Renderer::info() const { return held_ ? held_->info : FrameInfo{}; }
+
+Result<void> writeImage(const std::string& path, const Image& from) {
+    const size_t pixels = size_t{from.width} * from.height;
+    if (pixels == 0 || from.rgba.size() != 4 * pixels)
+        return Error{ErrorKind::usage, "has no pixels, or not four bytes for each", path, ""};
+    render::Image image{from.width, from.height, std::vector<uint32_t>(pixels), from.depth, from.normal, from.linear};
+    std::memcpy(image.rgba.data(), from.rgba.data(), from.rgba.size());
+    if (const auto written = image::writePicture(path, image, {}); !written) return given(written.error());
+    return {};
+}
+
+}  // namespace stipple::v1

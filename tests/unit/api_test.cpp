@@ -1,0 +1,281 @@
+// The library as other programs see it: its public headers alone, linked to libstipple.so.
+#include <gtest/gtest.h>
+#include <stipple/c.h>
+#include <stipple/stipple.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <thread>
+
+namespace {
+
+namespace fs = std::filesystem;
+using stipple::ErrorKind;
+
+class Api : public testing::Test {
+  protected:
+    Api() {
+        std::string pattern = (fs::temp_directory_path() / "stipple-api-XXXXXX").string();
+        folder_ = ::mkdtemp(pattern.data());
+        ::setenv("XDG_CACHE_HOME", (folder_ / "cache").c_str(), 1);
+    }
+    ~Api() override { fs::remove_all(folder_); }
+    std::string at(const std::string& name) const { return (folder_ / name).string(); }
+    static std::string bytesOf(const std::string& path) {
+        std::ifstream in(path, std::ios::binary);
+        return {std::istreambuf_iterator<char>(in), {}};
+    }
+    /// 4,000 points of a ball of radius 1 about (x, 0, 0).
+    std::string writeBall(const std::string& name, double x = 0) const {
+        std::ofstream out(at(name));
+        out << "ply\nformat ascii 1.0\nelement vertex 4000\nproperty double x\nproperty double y\nproperty double z\n"
+               "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+        for (int i = 0; i < 4000; ++i) {
+            const double z = 1 - 2 * (i + 0.5) / 4000, r = std::sqrt(1 - z * z), a = 2.399963 * i;
+            out << x + r * std::cos(a) << ' ' << r * std::sin(a) << ' ' << z << ' ' << i % 256 << " 90 200\n";
+        }
+        return at(name);
+    }
+    stipple::Scene sceneOf(const std::string& name, double x = 0) const {
+        auto scene = stipple::Scene::open({writeBall(name, x)});
+        EXPECT_TRUE(scene) << scene.error().line();
+        return std::move(*scene);
+    }
+    static stipple::Device device() { return std::move(stipple::Device::open("cpu", 2).value()); }
+    static stipple::Renderer renderer(const stipple::Device& device, const stipple::Scene& scene) {
+        return std::move(stipple::Renderer::create(device, scene).value());
+    }
+    fs::path folder_;
+};
+
+TEST_F(Api, DrawsThePicturesOfTheProgram) {
+    const stipple::Scene scene = sceneOf("ball.ply");
+    stipple::Renderer r = renderer(device(), scene);
+    const auto image = r.render(scene.overview(160.0 / 90), 160, 90);
+    ASSERT_TRUE(image) << image.error().line();
+    ASSERT_TRUE(stipple::writeImage(at("own.png"), *image));
+    const std::string command = std::string(STIPPLE_PROGRAM) + " render " + at("ball.ply") + " -o " +
+                                at("program.png") + " --size 160x90 --device cpu --quiet";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    EXPECT_TRUE(bytesOf(at("own.png")) == bytesOf(at("program.png")));
+    EXPECT_GT(bytesOf(at("own.png")).size(), 1000u);
+    // The control: another accuracy is another picture.
+    stipple::RenderSettings coarse;
+    coarse.errorPixels = 16;
+    const auto other = r.render(scene.overview(160.0 / 90), 160, 90, coarse);
+    ASSERT_TRUE(other);
+    EXPECT_NE(other->rgba, image->rgba);
+}
+
+TEST_F(Api, SeveralScenesAndRenderersShareADeviceAndEndInAnyOrder) {
+    auto opened = stipple::Device::open("cpu", 2);
+    ASSERT_TRUE(opened);
+    auto d = std::make_unique<stipple::Device>(std::move(*opened));
+    auto left = std::make_unique<stipple::Scene>(sceneOf("left.ply"));
+    auto right = std::make_unique<stipple::Scene>(sceneOf("right.ply", 5));
+    const stipple::Camera camera = left->overview(1);
+    auto first = std::make_unique<stipple::Renderer>(renderer(*d, *left));
+    auto second = std::make_unique<stipple::Renderer>(renderer(*d, *right));
+    auto third = std::make_unique<stipple::Renderer>(renderer(*d, *left));
+    const auto alone = first->render(camera, 64, 64);
+    const auto elsewhere = second->render(camera, 64, 64);
+    ASSERT_TRUE(alone && elsewhere);
+    EXPECT_NE(alone->rgba, elsewhere->rgba);
+    d.reset();
+    left.reset();
+    first.reset();
+    const auto again = third->render(camera, 64, 64);
+    ASSERT_TRUE(again) << again.error().line();
+    EXPECT_EQ(again->rgba, alone->rgba);
+    right.reset();
+    third.reset();
+    ASSERT_TRUE(second->render(camera, 64, 64));
+}
+
+TEST_F(Api, FramesGoOnUntilNothingIsMissing) {
+    const stipple::Scene scene = sceneOf("ball.ply");
+    stipple::Renderer r = renderer(device(), scene);
+    stipple::Image image;
+    stipple::FrameInfo info;
+    for (int f = 0; f < 2000 && !info.isComplete; ++f) {
+        const auto drawn = r.renderFrame(scene.overview(1), 96, 96, image);
+        ASSERT_TRUE(drawn) << drawn.error().line();
+        info = *drawn;
+    }
+    ASSERT_TRUE(info.isComplete);
+    EXPECT_LE(info.errorPixels, 1);
+    const auto waited = r.render(scene.overview(1), 96, 96);
+    ASSERT_TRUE(waited);
+    EXPECT_EQ(image.rgba, waited->rgba);
+}
+
+TEST_F(Api, ASecondThreadIsRefusedOrWaitsForNobody) {
+    const stipple::Device d = device();
+    const stipple::Scene scene = sceneOf("ball.ply");
+    const stipple::Camera camera = scene.overview(1);
+    stipple::Renderer one = renderer(d, scene), two = renderer(d, scene);
+    std::atomic<bool> isRefused{false}, isOther{false};
+    const auto draw = [&](stipple::Renderer& r) {
+        const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+        while (!isRefused && !isOther && std::chrono::steady_clock::now() < until) {
+            const auto image = r.render(camera, 64, 64);
+            if (!image) (image.error().kind == ErrorKind::usage ? isRefused : isOther) = true;
+        }
+    };
+    std::thread beside([&] { draw(two); });
+    draw(one);
+    beside.join();
+    EXPECT_TRUE(isRefused);
+    EXPECT_FALSE(isOther);
+    EXPECT_TRUE(one.render(camera, 64, 64));
+    // It ends while another draws.
+    std::thread drawing([&] { (void)one.render(camera, 640, 640); });
+    { const stipple::Renderer gone = std::move(two); }
+    drawing.join();
+    EXPECT_TRUE(one.render(camera, 64, 64));
+}
+
+TEST_F(Api, WhatFailsIsAValue) {
+    const auto kindOf = [](const auto& result) {
+        EXPECT_FALSE(result.error().what.empty());
+        return result ? ErrorKind::interrupted : result.error().kind;
+    };
+    EXPECT_EQ(kindOf(stipple::Device::open("abacus")), ErrorKind::usage);
+    EXPECT_EQ(kindOf(stipple::Scene::open({})), ErrorKind::usage);
+    EXPECT_EQ(kindOf(stipple::Scene::open({at("none.ply")})), ErrorKind::input);
+    EXPECT_EQ(kindOf(stipple::Store::open(at("none.stipple"))), ErrorKind::input);
+    EXPECT_EQ(kindOf(stipple::build({at("none.ply")}, at("out.stipple"))), ErrorKind::input);
+    EXPECT_EQ(kindOf(stipple::build({writeBall("b.ply")}, folder_.string())), ErrorKind::output);
+    EXPECT_EQ(kindOf(stipple::writeImage(at("x.png"), {})), ErrorKind::usage);
+    const stipple::Scene scene = sceneOf("ball.ply");
+    stipple::Renderer r = renderer(device(), scene);
+    stipple::Camera nowhere = scene.overview(1);
+    nowhere.target = nowhere.eye;
+    EXPECT_EQ(kindOf(r.render(nowhere, 32, 32)), ErrorKind::usage);
+    nowhere = scene.overview(1);
+    nowhere.eye[0] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(kindOf(r.render(nowhere, 32, 32)), ErrorKind::usage);
+    EXPECT_EQ(kindOf(r.render(scene.overview(1), 0, 32)), ErrorKind::usage);
+    stipple::RenderSettings settings;
+    settings.mode = "oil";
+    EXPECT_EQ(kindOf(r.render(scene.overview(1), 32, 32, settings)), ErrorKind::usage);
+    settings = {};
+    settings.effects = "sparkles";
+    EXPECT_EQ(kindOf(r.render(scene.overview(1), 32, 32, settings)), ErrorKind::usage);
+    stipple::Scene coloured = scene;
+    EXPECT_EQ(kindOf(coloured.colourBy("taste")), ErrorKind::usage);
+    const stipple::Renderer moved = std::move(r);
+    EXPECT_EQ(kindOf(r.render(scene.overview(1), 32, 32)), ErrorKind::usage);  // NOLINT(bugprone-use-after-move)
+}
+
+stipple::PointSource grid() {
+    stipple::PointSource source;
+    source.name = "grid";
+    source.parts = {3000, 5000};
+    source.hasColour = true;
+    source.read = [](size_t part, uint64_t first, uint64_t count, stipple::Points& to) -> stipple::Result<void> {
+        for (uint64_t i = first; i < first + count; ++i) {
+            const uint64_t n = part * 3000 + i;
+            to.position.push_back({500'000.25 + static_cast<double>(n % 100), 4e6 + static_cast<double>(n / 100), 7});
+            to.colour.push_back({10, 200, 30});
+        }
+        return {};
+    };
+    return source;
+}
+
+TEST_F(Api, PointsOfAProgramAreBuilt) {
+    stipple::BuildSettings settings;
+    double fraction = -1;
+    settings.listener.progress = [&](const stipple::Progress& p) {
+        EXPECT_GE(p.fraction, fraction);
+        fraction = p.fraction;
+    };
+    const auto built = stipple::build(grid(), at("grid.stipple"), settings);
+    ASSERT_TRUE(built) << built.error().line();
+    EXPECT_EQ(built->in, 8000u);
+    EXPECT_EQ(built->kept, 8000u);
+    const auto store = stipple::Store::open(at("grid.stipple"));
+    ASSERT_TRUE(store);
+    EXPECT_EQ(store->primitive(), "point");
+    EXPECT_EQ(store->primitives(), 8000u);
+    EXPECT_NEAR(store->boundsMin()[0], 500'000.25, 1e-6);
+    EXPECT_NEAR(store->boundsMax()[1], 4e6 + 79, 1e-6);
+    EXPECT_EQ(store->up(), (stipple::Vec3{0, 0, 1}));
+    // Placed twice.
+    stipple::Place beside;
+    beside.translation = {200, 0, 0};
+    const auto scene = stipple::Scene::of({{*store, {}}, {*store, beside}});
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_EQ(scene->primitives(), 16000u);
+    EXPECT_NEAR(scene->boundsMax()[0], 500'299.25, 1e-6);
+    beside.rotation[0] = {-1, 0, 0};
+    EXPECT_FALSE(stipple::Scene::of({{*store, beside}})) << "a mirror";
+}
+
+TEST_F(Api, ASourceThatFailsOrBreaksItsWordLeavesNothingBehind) {
+    stipple::PointSource source = grid();
+    source.read = [](size_t, uint64_t, uint64_t, stipple::Points&) -> stipple::Result<void> {
+        return stipple::Error{ErrorKind::input, "the sensor is unplugged", "port 3", ""};
+    };
+    const auto failed = stipple::build(source, at("a.stipple"));
+    ASSERT_FALSE(failed);
+    EXPECT_EQ(failed.error().what, "the sensor is unplugged");
+    source = grid();
+    source.hasNormal = true;
+    const auto short_ = stipple::build(source, at("a.stipple"));
+    ASSERT_FALSE(short_);
+    EXPECT_EQ(short_.error().kind, ErrorKind::input);
+    source.read = nullptr;
+    EXPECT_FALSE(stipple::build(source, at("a.stipple")));
+    stipple::BuildSettings stopped;
+    stopped.listener.isStopped = [] { return true; };
+    const auto ended = stipple::build(grid(), at("a.stipple"), stopped);
+    ASSERT_FALSE(ended);
+    EXPECT_EQ(ended.error().kind, ErrorKind::interrupted);
+    EXPECT_FALSE(fs::exists(at("a.stipple")));
+}
+
+TEST_F(Api, TheSubsetForCRefusesWhatIsNotThereAndDrawsTheSame) {
+    EXPECT_EQ(stipple_device_open("cpu", nullptr), 2);
+    EXPECT_NE(std::string(stipple_last_error()), "");
+    stipple_device* device = nullptr;
+    EXPECT_EQ(stipple_device_open("abacus", &device), 2);
+    EXPECT_EQ(device, nullptr);
+    ASSERT_EQ(stipple_device_open("cpu", &device), 0);
+    const std::string ball = writeBall("ball.ply");
+    const char* const inputs[] = {ball.c_str(), nullptr};
+    stipple_scene* scene = nullptr;
+    EXPECT_EQ(stipple_scene_open(inputs, 2, &scene), 2);
+    ASSERT_EQ(stipple_scene_open(inputs, 1, &scene), 0) << stipple_last_error();
+    stipple_camera camera;
+    ASSERT_EQ(stipple_scene_overview(scene, 1, &camera), 0);
+    stipple_renderer* renderer = nullptr;
+    EXPECT_EQ(stipple_renderer_create(device, nullptr, &renderer), 2);
+    ASSERT_EQ(stipple_renderer_create(device, scene, &renderer), 0);
+    stipple_device_close(device);
+    stipple_scene_close(scene);
+    std::vector<uint8_t> rgba(size_t{4} * 48 * 48);
+    double kept = -1;
+    EXPECT_EQ(stipple_render(renderer, &camera, 48, 48, 1, nullptr, &kept), 2);
+    EXPECT_EQ(stipple_render(renderer, &camera, 48, 48, -1, rgba.data(), &kept), 2);
+    ASSERT_EQ(stipple_render(renderer, &camera, 48, 48, 1, rgba.data(), &kept), 0) << stipple_last_error();
+    EXPECT_GT(kept, 0);
+    EXPECT_LE(kept, 1);
+    stipple_renderer_destroy(renderer);
+    stipple_renderer_destroy(nullptr);
+    const stipple::Scene same = sceneOf("ball.ply");
+    stipple::Renderer r = Api::renderer(Api::device(), same);
+    const auto image = r.render(same.overview(1), 48, 48);
+    ASSERT_TRUE(image);
+    EXPECT_EQ(image->rgba, rgba);
+}
+
+}  // namespace
