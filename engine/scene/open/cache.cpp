@@ -32,7 +32,7 @@ std::string settingsText(const OpenSettings& build) {
                  isStopped, told, progressStyle, onProgress] = build;
     // Not memory, temp, threads, ranks, together, leftovers, and who is told: any give the same. Not attributes: what
     // is cached has all of them.
-    const std::string of = material ? "|" + lod::identityOf(*material) : std::string();
+    const std::string of = material ? fmt::format("|{}", lod::identityOf(*material)) : std::string();
     return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}{}{}", normals, radii, up, duplicates, skipBad, onlyPoints,
                        allowOutside, dropOutliers, curveRadius, surfels, of, surfelWeights ? "|weights" : "");
 }
