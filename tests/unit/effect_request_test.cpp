@@ -117,7 +117,10 @@ TEST(EffectRequests, WhatIsTransparentIsLeftOutByNoneOrByName) {
         EXPECT_TRUE(ask({list, {}}, clear).settings.transparency) << list;
         EXPECT_EQ(ask({list, {}}, {}, {}, faint).settings.opacity, 0.5f) << list;
     }
-    expectRefused({"transparency", {}}, {"transparency needs --opacity"});
+    DrawSettings opaque;
+    const auto refused = requestEffects({"transparency", {}}, {}, {}, opaque);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().line().find("transparency needs --opacity"), std::string::npos) << refused.error().line();
 }
 
 TEST(EffectRequests, ParametersAskForTheirEffect) {
