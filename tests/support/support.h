@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <string>
@@ -73,6 +74,8 @@ lod::View fitView(const lod::Store& store, uint32_t width, uint32_t height);
 /// Path of a file of the data folder; empty (with a SKIP line, or a failure if the data is required) where it is
 /// missing.
 std::string dataFile(const std::string& name);
+/// In ./test --full (STIPPLE_LARGE): as often as it takes to be sure; otherwise as often as CI has time for.
+inline bool isThorough() { return std::getenv("STIPPLE_LARGE") != nullptr; }
 
 /// Whole files.
 std::string slurp(const std::string& path);
