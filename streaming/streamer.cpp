@@ -16,49 +16,68 @@
 namespace stipple::streaming {
 namespace {
 
-class FileSource final : public ByteSource {
-  public:
-    explicit FileSource(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
-    Result<void> read(uint64_t offset, void* destination, size_t count) const override {
-        return file_->readAt(offset, destination, count);
-    }
-
-  private:
-    std::shared_ptr<const InputFile> file_;
-};
-
 constexpr uint64_t kRetryFrames = 120;
 
-Result<lod::Chunk> fetch(const ByteSource& source, const lod::Hierarchy& h, uint32_t index, const ChunkFinish& finish,
-                         const std::string& where) {
-    const lod::ChunkPlace place = lod::chunkPlace(h, index);
-    const bool wantsAttributes = finish.wantsAttributes && !h.isTile(index);
-    const size_t attributeBytes = wantsAttributes ? h.payload(index).attributeBytes : 0;
-    std::vector<uint8_t> bytes(place.bytes + attributeBytes);
-    STIPPLE_TRY(source.read(place.offset, bytes.data(), bytes.size()));
-    const uint8_t* const attributes = bytes.data() + place.bytes;
-    if (hashBytes(bytes.data(), place.bytes) != place.hash ||
-        (wantsAttributes && hashBytes(attributes, attributeBytes) != h.payload(index).attributeHash))
-        return fail(ErrorKind::input, "the hash of a chunk does not match", where,
+/// A chunk as it is in the file.
+struct Stored {
+    std::vector<uint8_t> bytes, weights;  ///< attributes that are wanted stand behind the chunk's own
+};
+struct Asked {
+    std::shared_ptr<const ByteSource> source;
+    const lod::Hierarchy* hierarchy;
+    std::shared_ptr<const ChunkFinish> finish;
+    ChunkKey key;
+    std::string where;
+    size_t attributeBytes() const {
+        const bool isWanted = finish->wantsAttributes && !hierarchy->isTile(key.chunk);
+        return isWanted ? hierarchy->payload(key.chunk).attributeBytes : 0;
+    }
+    const lod::Stream* weights() const {
+        return hierarchy->isTile(key.chunk) ? nullptr : lod::weightsOf(*hierarchy, key.chunk);
+    }
+};
+
+Result<Stored> readStored(const Asked& asked) {
+    const lod::ChunkPlace place = lod::chunkPlace(*asked.hierarchy, asked.key.chunk);
+    Stored stored;
+    stored.bytes.resize(place.bytes + asked.attributeBytes());
+    STIPPLE_TRY(asked.source->readAt(place.offset, stored.bytes.data(), stored.bytes.size()));
+    if (const lod::Stream* weights = asked.weights()) {
+        stored.weights.resize(weights->bytes);
+        STIPPLE_TRY(asked.source->readAt(weights->offset, stored.weights.data(), stored.weights.size()));
+    }
+    return stored;
+}
+
+Result<lod::Chunk> decode(const Asked& asked, const Stored& stored) {
+    const lod::Hierarchy& h = *asked.hierarchy;
+    const lod::ChunkPlace place = lod::chunkPlace(h, asked.key.chunk);
+    const auto damaged = [&](const char* what) {
+        return fail(ErrorKind::input, fmt::format("the hash of {} does not match", what), asked.where,
                     "the store is damaged; build it again");
-    STIPPLE_ASSIGN(lod::Chunk chunk, lod::decodeStored(h, index, bytes.data(), place.bytes, where, false));
-    if (finish.apply) STIPPLE_TRY(finish.apply(index, chunk, attributes, attributeBytes));
-    if (const lod::Stream* weights = h.isTile(index) ? nullptr : lod::weightsOf(h, index)) {
-        bytes.resize(weights->bytes);
-        STIPPLE_TRY(source.read(weights->offset, bytes.data(), bytes.size()));
-        if (hashBytes(bytes.data(), bytes.size()) != weights->hash)
-            return fail(ErrorKind::input, "the hash of the weights of a chunk does not match", where,
-                        "the store is damaged; build it again");
-        STIPPLE_ASSIGN(chunk.weights, lod::decodeWeights(bytes.data(), bytes.size(), h.payload(index).records, where));
+    };
+    const size_t attributeBytes = asked.attributeBytes();
+    const uint8_t* const attributes = stored.bytes.data() + place.bytes;
+    if (hashBytes(stored.bytes.data(), place.bytes) != place.hash ||
+        (attributeBytes > 0 && hashBytes(attributes, attributeBytes) != h.payload(asked.key.chunk).attributeHash))
+        return damaged("a chunk");
+    STIPPLE_ASSIGN(lod::Chunk chunk,
+                   lod::decodeStored(h, asked.key.chunk, stored.bytes.data(), place.bytes, asked.where, false));
+    if (asked.finish->apply) STIPPLE_TRY(asked.finish->apply(asked.key.chunk, chunk, attributes, attributeBytes));
+    if (const lod::Stream* weights = asked.weights()) {
+        if (hashBytes(stored.weights.data(), stored.weights.size()) != weights->hash)
+            return damaged("the weights of a chunk");
+        STIPPLE_ASSIGN(chunk.weights, lod::decodeWeights(stored.weights.data(), stored.weights.size(),
+                                                         h.payload(asked.key.chunk).records, asked.where));
     }
     return chunk;
 }
 
 /// Tasks of an executor throw nothing: a chunk for which there is no memory is one that failed.
-Result<lod::Chunk> fetchOrFail(const ByteSource& source, const lod::Hierarchy& h, uint32_t index,
-                               const ChunkFinish& finish, const std::string& where) noexcept {
+template <typename Work>
+auto orFail(const Work& work) noexcept -> decltype(work()) {
     try {
-        return fetch(source, h, index, finish, where);
+        return work();
     } catch (const std::bad_alloc&) {  // the text is short enough to take no memory
         return fail(ErrorKind::budget, "out of memory");
     } catch (...) {
@@ -67,10 +86,6 @@ Result<lod::Chunk> fetchOrFail(const ByteSource& source, const lod::Hierarchy& h
 }
 
 }  // namespace
-
-std::unique_ptr<ByteSource> makeFileSource(std::shared_ptr<const InputFile> file) {
-    return std::make_unique<FileSource>(std::move(file));
-}
 
 bool isLegalTransition(ChunkState from, ChunkState to) {
     static const std::array<std::pair<ChunkState, ChunkState>, 8> legal{
@@ -90,7 +105,9 @@ Streamer::Streamer(Executor& executor, ChunkSink& sink, StreamSettings settings)
       executorLife_(executor.life()),
       sink_(sink),
       settings_(settings),
-      completed_(std::make_shared<CompletionQueue<Arrival>>()) {}
+      completed_(std::make_shared<CompletionQueue<Arrival>>()) {
+    ends_.before = ends_.after = {kNoSource, 0};
+}
 
 Streamer::~Streamer() {
     if (!executorLife_.expired()) executor_.wait();
@@ -105,6 +122,11 @@ void Streamer::addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const 
                         std::make_shared<const ChunkFinish>(std::move(finish)),
                         std::vector<ChunkLife>(hierarchy.chunks())});
     drawable_.emplace_back(hierarchy.chunks(), uint8_t{0});
+    const auto index = static_cast<uint32_t>(sources_.size() - 1);
+    for (uint32_t n = 0; n < hierarchy.chunks(); ++n) {
+        ChunkLife& life = sources_.back().chunks[n];
+        life.before = life.after = {index, n};
+    }
 }
 
 void Streamer::setState(ChunkKey key, ChunkState to) {
@@ -134,7 +156,12 @@ void Streamer::upload() {
     uint64_t uploaded = 0;
     size_t taken = 0;
     for (; taken < arrived_.size(); ++taken) {
-        const Arrival& arrival = arrived_[taken];
+        Arrival& arrival = arrived_[taken];
+        if (lifeOf(arrival.key).lastWanted < frame_) {
+            setState(arrival.key, ChunkState::absent);
+            ++counters_.unwanted;
+            continue;
+        }
         const uint64_t bytes = lod::decodedBytes(*sources_[arrival.key.source].hierarchy, arrival.key.chunk);
         if (uploaded > 0 && uploaded + bytes > settings_.uploadBytesPerFrame) break;
         if (!makeRoom(bytes)) {
@@ -143,7 +170,7 @@ void Streamer::upload() {
             ++counters_.refused;
             continue;
         }
-        if (const auto result = sink_.upload(arrival.key, *arrival.chunk); !result) {
+        if (const auto result = sink_.upload(arrival.key, std::move(*arrival.chunk)); !result) {
             setState(arrival.key, ChunkState::failed);
             sources_[arrival.key.source].chunks[arrival.key.chunk].retryAt = frame_ + kRetryFrames;
             ++counters_.failures;
@@ -151,9 +178,8 @@ void Streamer::upload() {
             continue;
         }
         setState(arrival.key, ChunkState::resident);
-        Source& source = sources_[arrival.key.source];
-        source.chunks[arrival.key.chunk].lastUsed = frame_;
         countInParents(arrival.key, 1);
+        use(arrival.key);
         counters_.residentBytes += bytes;
         ++counters_.uploads;
         uploaded += bytes;
@@ -161,18 +187,61 @@ void Streamer::upload() {
     arrived_.erase(arrived_.begin(), arrived_.begin() + static_cast<std::ptrdiff_t>(taken));
 }
 
+bool Streamer::isEvictable(ChunkKey key) const {
+    const Source& source = sources_[key.source];
+    const ChunkLife& life = source.chunks[key.chunk];
+    return life.state == ChunkState::resident && life.residentBelow == 0 &&
+           !lod::isOfRoot(*source.hierarchy, key.chunk);
+}
+
+void Streamer::unlink(ChunkKey key) {
+    ChunkLife& life = lifeOf(key);
+    lifeOf(life.before).after = life.after;
+    lifeOf(life.after).before = life.before;
+    life.before = life.after = key;
+}
+
+void Streamer::linkAfter(ChunkKey before, ChunkKey key) {
+    const ChunkKey after = lifeOf(before).after;
+    lifeOf(key).before = before;
+    lifeOf(key).after = after;
+    lifeOf(before).after = key;
+    lifeOf(after).before = key;
+}
+
+/// From both ends: a parent is in use still, or was given up with the child that made room for it.
+ChunkKey Streamer::placeOf(uint64_t lastUsed) {
+    ChunkKey early = ends_.after, late = ends_.before;
+    for (;;) {
+        if (late.source == kNoSource || lifeOf(late).lastUsed <= lastUsed) return late;
+        if (lifeOf(early).lastUsed > lastUsed) return lifeOf(early).before;
+        late = lifeOf(late).before;
+        early = lifeOf(early).after;
+    }
+}
+
+void Streamer::use(ChunkKey key) {
+    lifeOf(key).lastUsed = frame_;
+    if (!isEvictable(key)) return;
+    unlink(key);
+    linkAfter(ends_.before, key);
+}
+
 /// A chunk is not evicted before those that build on it.
 void Streamer::countInParents(ChunkKey key, int change) {
     Source& source = sources_[key.source];
-    const lod::Hierarchy& h = *source.hierarchy;
-    lod::forEachRequired(h, key.chunk, [&](uint32_t above) {
-        uint16_t& below = source.chunks[above].residentBelow;
-        below = static_cast<uint16_t>(below + change);
+    lod::forEachRequired(*source.hierarchy, key.chunk, [&](uint32_t above) {
+        const ChunkKey parent{key.source, above};
+        ChunkLife& life = source.chunks[above];
+        if (life.residentBelow == 0 && change > 0) unlink(parent);
+        life.residentBelow = static_cast<uint16_t>(life.residentBelow + change);
+        if (change < 0 && isEvictable(parent)) linkAfter(placeOf(life.lastUsed), parent);
     });
 }
 
 void Streamer::evict(ChunkKey key) {
     Source& source = sources_[key.source];
+    unlink(key);
     sink_.evict(key);
     setState(key, ChunkState::absent);
     countInParents(key, -1);
@@ -182,20 +251,9 @@ void Streamer::evict(ChunkKey key) {
 
 bool Streamer::makeRoom(uint64_t bytes) {
     while (counters_.residentBytes + bytes > settings_.residentBytes) {
-        ChunkKey oldest{};
-        uint64_t oldestUse = frame_;  // what this frame keeps is never evicted
-        bool found = false;
-        for (uint32_t i = 0; i < sources_.size(); ++i)
-            for (uint32_t n = 1; n < sources_[i].chunks.size(); ++n) {
-                const ChunkLife& s = sources_[i].chunks[n];
-                const lod::Hierarchy& h = *sources_[i].hierarchy;
-                if (s.state != ChunkState::resident || s.residentBelow != 0 || s.lastUsed >= oldestUse) continue;
-                if (lod::isOfRoot(h, n)) continue;
-                oldestUse = s.lastUsed;
-                oldest = {i, n};
-                found = true;
-            }
-        if (!found) return false;
+        const ChunkKey oldest = ends_.after;
+        if (oldest.source == kNoSource) return false;
+        if (lifeOf(oldest).lastUsed >= frame_) return false;  // what this frame keeps is never evicted
         evict(oldest);
     }
     return true;
@@ -203,7 +261,8 @@ bool Streamer::makeRoom(uint64_t bytes) {
 
 void Streamer::request(const lod::Cut& cut) {
     ++frame_;
-    for (const auto& [source, chunk] : cut.keep) sources_[source].chunks[chunk].lastUsed = frame_;
+    for (const auto& [source, chunk] : cut.keep) use({source, chunk});
+    for (const lod::CutWanted& w : cut.wanted) lifeOf({w.source, w.chunk}).lastWanted = frame_;
     wanted_.assign(cut.wanted.begin(), cut.wanted.end());
     std::sort(wanted_.begin(), wanted_.end(), lod::isMoreUrgent);
     for (const lod::CutWanted& w : wanted_) {
@@ -221,8 +280,15 @@ void Streamer::start(uint32_t sourceIndex, uint32_t chunk) {
     ++counters_.inFlight;
     ++counters_.requests;
     const std::string where = fmt::format("{}: chunk {}", source.name, chunk);
-    executor_.run([key, where, bytes = source.bytes, h = source.hierarchy, finish = source.finish, queue = completed_] {
-        queue->push({key, fetchOrFail(*bytes, *h, key.chunk, *finish, where)});
+    auto asked = std::make_shared<const Asked>(Asked{source.bytes, source.hierarchy, source.finish, key, where});
+    executor_.read([asked = std::move(asked), queue = completed_, &executor = executor_] {
+        auto stored = std::make_shared<Result<Stored>>(orFail([&] { return readStored(*asked); }));
+        executor.run([asked, stored, queue] {
+            if (!*stored)
+                queue->push({asked->key, tl::unexpected((*stored).error())});
+            else
+                queue->push({asked->key, orFail([&] { return decode(*asked, **stored); })});
+        });
     });
 }
 
@@ -261,8 +327,9 @@ void Streamer::request(const lod::ResidentPlan& plan) {
     for (uint32_t s = 0; s < sources_.size(); ++s)
         for (uint32_t n = 0; n < sources_[s].chunks.size(); ++n) {
             if (!plan.chunks[s][n]) continue;
+            sources_[s].chunks[n].lastWanted = frame_;
             if (drawable_[s][n])
-                sources_[s].chunks[n].lastUsed = frame_;
+                use({s, n});
             else if (counters_.inFlight < settings_.requestsInFlight)
                 start(s, n);
         }

@@ -1,9 +1,10 @@
 // Keeps the chunks that the cut wants resident: reads and decodes them on the executor, hands them to the sink within a
 // byte budget, evicts what nobody needs. The life of a request:
 //   1. the cut wants a chunk            absent -> requested     (request)
-//   2. a worker reads and decodes it    requested               (executor)
+//   2. a thread reads it, a worker decodes it   requested       (executor)
 //   3. it arrives                       requested -> arrived    (collect, the only place where async work enters)
 //   4. it is uploaded within the budget arrived -> resident     (upload; drawable from the next frame on)
+//      or nobody wants it any more      arrived -> absent
 //   5. nobody keeps it any more         resident -> absent      (evict, least recently used, children before parents)
 // A chunk that cannot be read is failed: counted, its parent stays drawn, tried again after a pause.
 #pragma once
@@ -13,12 +14,12 @@
 #include <memory>
 #include <vector>
 
+#include "engine/base/byte_source.h"
 #include "engine/base/executor.h"
 #include "engine/base/queue.h"
 #include "lod/cut/cut.h"
 #include "lod/cut/resident.h"
 #include "lod/store/chunk.h"
-#include "streaming/byte_source.h"
 
 namespace stipple::streaming {
 
@@ -31,7 +32,7 @@ struct ChunkKey {
 class ChunkSink {
   public:
     virtual ~ChunkSink() = default;
-    virtual Result<void> upload(ChunkKey key, const lod::Chunk& chunk) = 0;
+    virtual Result<void> upload(ChunkKey key, lod::Chunk chunk) = 0;
     virtual void evict(ChunkKey key) = 0;
 };
 
@@ -54,6 +55,7 @@ struct StreamSettings {
 
 struct StreamCounters {
     uint64_t bytesStreamed = 0, residentBytes = 0, requests = 0, uploads = 0, evictions = 0, failures = 0, refused = 0;
+    uint64_t unwanted = 0;  ///< arrived when nobody wanted them any more
     uint32_t inFlight = 0;
 };
 
@@ -98,7 +100,8 @@ class Streamer {
     struct ChunkLife {
         ChunkState state = ChunkState::absent;
         uint16_t residentBelow = 0;  ///< that build on it
-        uint64_t lastUsed = 0, retryAt = 0;
+        uint64_t lastUsed = 0, lastWanted = 0, retryAt = 0;
+        ChunkKey before, after;  ///< in the list of what may be evicted, least recently used first; alone: itself
     };
     struct Source {
         const lod::Hierarchy* hierarchy;
@@ -116,12 +119,23 @@ class Streamer {
     void start(uint32_t source, uint32_t chunk);
     void evict(ChunkKey key);
     void countInParents(ChunkKey key, int change);
+    ChunkLife& lifeOf(ChunkKey key) { return key.source == kNoSource ? ends_ : sources_[key.source].chunks[key.chunk]; }
+    /// Resident, and nobody's parent: in the list, unless it is of the root.
+    bool isEvictable(ChunkKey key) const;
+    void unlink(ChunkKey key);
+    void linkAfter(ChunkKey before, ChunkKey key);
+    /// Where what was used in that frame belongs: behind this one.
+    ChunkKey placeOf(uint64_t lastUsed);
+    /// It is in use now.
+    void use(ChunkKey key);
 
     Executor& executor_;
     std::weak_ptr<const void> executorLife_;  ///< one that is gone has finished what it had
     ChunkSink& sink_;
     StreamSettings settings_;
+    static constexpr uint32_t kNoSource = 0xffffffffu;
     std::vector<Source> sources_;
+    ChunkLife ends_;  ///< of the list: after it comes its first, before it its last
     std::vector<std::vector<uint8_t>> drawable_;
     std::shared_ptr<CompletionQueue<Arrival>> completed_;
     std::vector<Arrival> arrived_;

@@ -49,33 +49,39 @@ class ThreadExecutor final : public Executor {
 };
 #endif
 
-/// Takes the tasks of run() where an arena has one thread: that one may be waiting for what they give.
-class SideThread {
+/// Takes tasks that the threads of an arena should not: those of read(), and those of run() where the arena has one
+/// thread, which may be waiting for what they give. Threads come as tasks do, `most` of them.
+class SideThreads {
   public:
-    ~SideThread() {
+    explicit SideThreads(size_t most) : most_(most) {}
+    ~SideThreads() {
         {
             const std::lock_guard lock(mutex_);
             isOver_ = true;
         }
         changed_.notify_all();
-        if (thread_.joinable()) thread_.join();
+        for (std::thread& t : threads_) t.join();
     }
     void run(std::function<void()> task) {
-        if (!thread_.joinable()) try {
-                thread_ = std::thread([this] { work(); });
-            } catch (const std::system_error&) {  // there is none to be had: here and now, then
-                task();
-                return;
-            }
         {
             const std::lock_guard lock(mutex_);
             tasks_.push_back(std::move(task));
+            if (threads_.size() < most_ && busy_ + tasks_.size() > threads_.size()) try {
+                    threads_.emplace_back([this] { work(); });
+                } catch (const std::system_error&) {  // none more are to be had
+                }
+            if (!threads_.empty()) {
+                changed_.notify_all();
+                return;
+            }
+            task = std::move(tasks_.front());
+            tasks_.pop_front();
         }
-        changed_.notify_all();
+        task();  // here and now, then
     }
     void wait() {
         std::unique_lock lock(mutex_);
-        changed_.wait(lock, [&] { return tasks_.empty() && !isBusy_; });
+        changed_.wait(lock, [&] { return tasks_.empty() && busy_ == 0; });
     }
 
   private:
@@ -86,20 +92,22 @@ class SideThread {
             if (tasks_.empty()) return;
             std::function<void()> task = std::move(tasks_.front());
             tasks_.pop_front();
-            isBusy_ = true;
+            ++busy_;
             lock.unlock();
             task();
             task = nullptr;  // and what it holds
             lock.lock();
-            isBusy_ = false;
+            --busy_;
             changed_.notify_all();
         }
     }
+    const size_t most_;
     std::mutex mutex_;
     std::condition_variable changed_;
     std::deque<std::function<void()>> tasks_;
-    bool isBusy_ = false, isOver_ = false;
-    std::thread thread_;
+    size_t busy_ = 0;
+    bool isOver_ = false;
+    std::vector<std::thread> threads_;
 };
 
 /// Where more threads than cores are asked for, TBB's market must be told so, or an arena never gets them. Of several
@@ -137,16 +145,19 @@ class TbbExecutor final : public Executor {
         else
             arena_.execute([&] { group_.run(std::move(task)); });
     }
+    void read(std::function<void()> task) override { readers_.run(std::move(task)); }
     void wait() override {
+        readers_.wait();  // what they start is waited for next
         side_.wait();
         arena_.execute([&] { group_.wait(); });
     }
     int threads() const override { return arena_.max_concurrency(); }
 
   private:
+    static constexpr size_t kReaders = 4;  // as many requests as a disk or a connection has use for
     tbb::task_arena arena_;
     tbb::task_group group_;
-    SideThread side_;
+    SideThreads side_{1}, readers_{kReaders};
 };
 
 class SerialExecutor final : public Executor {

@@ -14,7 +14,10 @@ class Executor {
     virtual void parallelFor(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) = 0;
     /// Starts `task` and returns. It must not throw.
     virtual void run(std::function<void()> task) = 0;
-    /// Waits for everything that run() started.
+    /// Starts a task that waits for a disk or a network, where no thread of parallelFor has to wait for it. It may call
+    /// run() of this executor. It must not throw.
+    virtual void read(std::function<void()> task) { run(std::move(task)); }
+    /// Waits for everything that run() and read() started.
     virtual void wait() = 0;
     virtual int threads() const = 0;
     /// Ends with the executor: whoever may outlive it asks before going on.

@@ -84,4 +84,17 @@ uint64_t fileIdentity(const std::string& path) {
     return hashBytes(text.data(), text.size());
 }
 
+uint64_t InputFile::identity() const { return fileIdentity(path_); }
+
+uint64_t MemorySource::identity() const { return hashBytes(bytes_.data(), bytes_.size()); }
+
+Result<void> MemorySource::readAt(uint64_t offset, void* destination, size_t count) const {
+    if (offset > bytes_.size() || count > bytes_.size() - offset)
+        return fail(ErrorKind::input,
+                    fmt::format("{} bytes are needed at offset {}, but there are {}", count, offset, bytes_.size()),
+                    name_);
+    if (count > 0) std::memcpy(destination, bytes_.data() + offset, count);
+    return {};
+}
+
 }  // namespace stipple

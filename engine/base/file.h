@@ -7,21 +7,22 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/byte_source.h"
 #include "engine/base/result.h"
 
 namespace stipple {
 
 /// A read-only file. readAt is safe from several threads.
-class InputFile {
+class InputFile final : public ByteSource {
   public:
     static Result<InputFile> open(const std::string& path);
     InputFile(InputFile&& other) noexcept;
     InputFile& operator=(InputFile&& other) noexcept;
-    ~InputFile();
-    uint64_t sizeBytes() const { return sizeBytes_; }
-    const std::string& path() const { return path_; }
-    /// Reads exactly `count` bytes at `offset`; an error names the place if the file ends earlier.
-    Result<void> readAt(uint64_t offset, void* destination, size_t count) const;
+    ~InputFile() override;
+    uint64_t sizeBytes() const override { return sizeBytes_; }
+    const std::string& path() const override { return path_; }
+    uint64_t identity() const override;
+    Result<void> readAt(uint64_t offset, void* destination, size_t count) const override;
 
   private:
     InputFile(int descriptor, uint64_t sizeBytes, std::string path);

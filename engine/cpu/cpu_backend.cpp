@@ -31,8 +31,8 @@ class CpuBackend final : public render::DrawsAtOnce {
     std::string device() const override {
         return std::string("cpu ") + frame_.k.name + ", " + std::to_string(frame_.executor.threads()) + " threads";
     }
-    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
-        const lod::Chunk& kept = chunks_.chunks[Chunks::idOf(key)] = chunk;
+    Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
+        const lod::Chunk& kept = chunks_.chunks[Chunks::idOf(key)] = std::move(chunk);
         if (!kept.texels.empty()) {
             if (chunks_.tiles.size() <= key.source) chunks_.tiles.resize(key.source + 1);
             auto& tiles = chunks_.tiles[key.source];

@@ -63,7 +63,7 @@ class GpuBackend final : public render::Backend {
         return r;
     }
 
-    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
+    Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
         STIPPLE_ASSIGN(const PageStore::Place place, pages_.allocate(chunk.sizeBytes()));
         places_[chunkId(key)] = place;
         pending_.push_back({pages_.buffer(place), place.offset, bytesOfChunk(chunk)});

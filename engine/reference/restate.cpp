@@ -216,8 +216,8 @@ class ReferenceBackend final : public render::DrawsAtOnce {
     ReferenceBackend(Executor& executor, const Variation& variation) : executor_(executor), variation_(variation) {}
     std::string name() const override { return "reference"; }
     std::string device() const override { return "fp64 reference, scalar"; }
-    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
-        chunks_[uint64_t{key.source} << 32 | key.chunk] = chunk;
+    Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
+        chunks_[uint64_t{key.source} << 32 | key.chunk] = std::move(chunk);
         return {};
     }
     void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.source} << 32 | key.chunk); }

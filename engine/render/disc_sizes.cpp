@@ -18,7 +18,7 @@ bool isSpacingTold(const lod::Hierarchy& h, uint32_t chunk) {
 
 }  // namespace
 
-Result<void> DiscSizes::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
+Result<void> DiscSizes::upload(streaming::ChunkKey key, lod::Chunk chunk) {
     if (life_.expired()) return fail(ErrorKind::device, "what draws the scene is gone");
     uint32_t code = 0;
     uint64_t sum = 0;
@@ -36,7 +36,7 @@ Result<void> DiscSizes::upload(streaming::ChunkKey key, const lod::Chunk& chunk)
     const bool isTold = key.source < hierarchies_.size() && isSpacingTold(*hierarchies_[key.source], key.chunk);
     of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), static_cast<uint8_t>(usual), isDense,
                      isTold ? 0 : lod::recordSpacing(records)};
-    return backend_.upload(keyOfBackend(key), chunk);
+    return backend_.upload(keyOfBackend(key), std::move(chunk));
 }
 
 void DiscSizes::evict(streaming::ChunkKey key) {

@@ -30,7 +30,7 @@ class DiscSizes final : public streaming::ChunkSink {
     void setFirstSource(uint32_t first) { first_ = first; }
     /// Sources come in the order of their numbers. What the store tells of spacings is not measured again.
     void addSource(const lod::Hierarchy& h) { hierarchies_.push_back(&h); }
-    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override;
+    Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override;
     void evict(streaming::ChunkKey key) override;
     struct Share {
         float ofEdge = 0;      ///< over the edge of the node's cell; 0 of what has no points

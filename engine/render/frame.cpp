@@ -139,7 +139,7 @@ class Placer {
         const uint32_t number = sources_++;
         if (isPlain) plainSources_[p.store.get()] = number;
         state_.discSizes->addSource(p.store->hierarchy);
-        state_.streamer->addSource(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
+        state_.streamer->addSource(p.store->hierarchy, p.store->file, p.store->path,
                                    p.patchesAreSamples ? withSamples(finishOf(p), p) : finishOf(p));
         return number;
     }

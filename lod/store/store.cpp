@@ -117,7 +117,7 @@ namespace {
 bool hasPayloadsInNodes(const Head& head) { return head.version == kOldVersion || head.version == kOldWideMeshVersion; }
 
 /// The head, with its hash and the foot's checked; of old versions what they do not have is empty.
-Result<Head> readHead(const InputFile& file) {
+Result<Head> readHead(const ByteSource& file) {
     const std::string& path = file.path();
     Head head{};
     if (file.sizeBytes() < kOldHeadBytes + sizeof(Foot))
@@ -176,7 +176,7 @@ std::string tellSourceCodes(double lattice, Hierarchy& h) {
 }
 
 /// The tables of nodes and payloads, and the description.
-Result<void> readTables(const InputFile& file, const Head& head, Store& store) {
+Result<void> readTables(const ByteSource& file, const Head& head, Store& store) {
     Hierarchy& h = store.hierarchy;
     moveHead(h, head, kFromDisk);
     const bool isOld = hasPayloadsInNodes(head);
@@ -217,9 +217,14 @@ Result<void> readTables(const InputFile& file, const Head& head, Store& store) {
 
 Result<Store> openStore(const std::string& path) {
     STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    return openStore(std::make_shared<const InputFile>(std::move(opened)));
+}
+
+Result<Store> openStore(std::shared_ptr<const ByteSource> source) {
+    const std::string path = source->path();
     Store store;
     store.path = path;
-    store.file = std::make_shared<const InputFile>(std::move(opened));
+    store.file = std::move(source);
     STIPPLE_ASSIGN(const Head head, readHead(*store.file));
     STIPPLE_TRY(readTables(*store.file, head, store));
     Hierarchy& h = store.hierarchy;

@@ -29,7 +29,7 @@ struct Store {
     uint64_t contentHash = 0;
     uint64_t fileBytes = 0;
     std::string path;
-    std::shared_ptr<const InputFile> file;
+    std::shared_ptr<const ByteSource> file;
 };
 
 class StoreWriter {
@@ -59,6 +59,8 @@ class StoreWriter {
 
 /// Reads and checks head, foot, node table and description (not the chunks).
 Result<Store> openStore(const std::string& path);
+/// Of bytes that are a .stipple file, wherever they are.
+Result<Store> openStore(std::shared_ptr<const ByteSource> source);
 /// Where a chunk lies in the file.
 struct ChunkPlace {
     uint64_t offset, hash;

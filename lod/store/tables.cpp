@@ -18,7 +18,7 @@ namespace stipple::lod {
 using namespace layout;
 
 /// `most`: bytes that what was read before allows it to have; checked before any memory is taken.
-Result<std::vector<uint8_t>> readSection(const InputFile& file, const Section& s, uint64_t most, const char* name) {
+Result<std::vector<uint8_t>> readSection(const ByteSource& file, const Section& s, uint64_t most, const char* name) {
     const std::string where = fmt::format("{}: {}", file.path(), name);
     if (s.offset > file.sizeBytes() || s.bytes > file.sizeBytes() - s.offset)
         return tl::unexpected(
@@ -137,7 +137,7 @@ bool isPossibleCount(uint32_t records, uint32_t parentCodes, uint32_t ownCodes, 
     return parentCodes <= most && ownCodes <= most;
 }
 
-Result<std::vector<CodeCount>> readPairs(const InputFile& file, const Head& head, uint64_t codes) {
+Result<std::vector<CodeCount>> readPairs(const ByteSource& file, const Head& head, uint64_t codes) {
     STIPPLE_ASSIGN(const std::vector<uint8_t> bytes,
                    readSection(file, head.counts, codes * sizeof(CodeCount), "code counts"));
     const uint8_t* at = bytes.data();
@@ -186,7 +186,7 @@ struct PayloadSection {
     std::vector<StreamOnDisk> streams;
 };
 
-Result<PayloadSection> readPayloads(const InputFile& file, const Head& head, uint64_t count) {
+Result<PayloadSection> readPayloads(const ByteSource& file, const Head& head, uint64_t count) {
     constexpr uint64_t kMostNames = 64;
     const uint64_t most = sizeof(PayloadHead) + kMostNames * sizeof(NameOnDisk) +
                           count * (sizeof(PayloadOnDisk) + kMostStreams * sizeof(StreamOnDisk));
@@ -234,7 +234,7 @@ void describeKinds(Hierarchy& h) {
 
 }  // namespace
 
-Result<void> readNodes(const InputFile& file, const Head& head, Hierarchy& h) {
+Result<void> readNodes(const ByteSource& file, const Head& head, Hierarchy& h) {
     STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readSection(file, head.nodes, head.nodes.rawBytes, "node table"));
     const uint8_t* at = bytes.data();
     h.nodes.resize(head.nodeCount);
@@ -283,7 +283,7 @@ Result<void> readNodes(const InputFile& file, const Head& head, Hierarchy& h) {
     return {};
 }
 
-Result<bool> readOldNodes(const InputFile& file, const Head& head, Hierarchy& h) {
+Result<bool> readOldNodes(const ByteSource& file, const Head& head, Hierarchy& h) {
     STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readSection(file, head.nodes, head.nodes.rawBytes, "node table"));
     const uint8_t* at = bytes.data();
     const auto onDisk = takeArray<OldNodeOnDisk>(at, head.nodeCount);

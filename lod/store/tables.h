@@ -14,13 +14,13 @@ namespace stipple::lod {
 inline constexpr uint32_t kMostStreams = 16;
 
 /// `most`: bytes that what was read before allows it to have; checked before any memory is taken.
-Result<std::vector<uint8_t>> readSection(const InputFile& file, const layout::Section& s, uint64_t most,
+Result<std::vector<uint8_t>> readSection(const ByteSource& file, const layout::Section& s, uint64_t most,
                                          const char* name);
 
 /// Nodes, payloads, streams and counts per code.
-Result<void> readNodes(const InputFile& file, const layout::Head& head, Hierarchy& h);
+Result<void> readNodes(const ByteSource& file, const layout::Head& head, Hierarchy& h);
 /// The same of versions 6 and 7, but for the kinds; were there counts per code?
-Result<bool> readOldNodes(const InputFile& file, const layout::Head& head, Hierarchy& h);
+Result<bool> readOldNodes(const ByteSource& file, const layout::Head& head, Hierarchy& h);
 /// Every node has one payload, of this kind.
 void setKindOfAll(Hierarchy& h, Kind kind);
 Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path, Hierarchy& h);

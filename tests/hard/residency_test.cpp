@@ -12,7 +12,7 @@ namespace {
 
 class Sink final : public streaming::ChunkSink {
   public:
-    Result<void> upload(streaming::ChunkKey, const lod::Chunk&) override { return {}; }
+    Result<void> upload(streaming::ChunkKey, lod::Chunk) override { return {}; }
     void evict(streaming::ChunkKey) override {}
 };
 
@@ -30,7 +30,7 @@ class ResidencyAtRest : public testing::Test {
         streaming::StreamSettings settings;
         settings.residentBytes = residentBytes;
         streaming::Streamer streamer(*executor_, sink, settings);
-        streamer.addSource(store_->hierarchy, streaming::makeFileSource(store_->file), "a");
+        streamer.addSource(store_->hierarchy, store_->file, "a");
         uint64_t before = 0;
         constexpr int kSettles = 120, kFrames = 120;
         for (int i = 0; i < kSettles + kFrames; ++i) {

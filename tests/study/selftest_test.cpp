@@ -21,8 +21,8 @@ class SpoiltBackend : public render::DrawsAtOnce {
         : inner_(std::move(inner)), spoil_(std::move(spoil)) {}
     std::string name() const override { return inner_->name(); }
     std::string device() const override { return inner_->device(); }
-    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
-        return inner_->upload(key, chunk);
+    Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
+        return inner_->upload(key, std::move(chunk));
     }
     void evict(streaming::ChunkKey key) override { inner_->evict(key); }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <thread>
@@ -93,6 +94,32 @@ TEST(Executor, HasItsThreadsBesideOthers) {
         --inside;
     });
     EXPECT_EQ(most, 1);
+}
+
+TEST(Executor, ReadingKeepsNoWorkerFromItsWork) {
+    const auto executor = makeTbbExecutor(2);
+    std::atomic<bool> isOver{false};
+    std::atomic<int> begun{0}, ended{0}, after{0};
+    for (int i = 0; i < 8; ++i)
+        executor->read([&] {
+            while (!isOver) std::this_thread::yield();
+            ++ended;
+            executor->run([&] { ++after; });
+        });
+    // Two pieces that wait for each other: both workers must be free.
+    std::atomic<bool> isMet{true};
+    executor->parallelFor(2, 1, [&](size_t, size_t) {
+        ++begun;
+        const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+        while (begun < 2 && isMet)
+            if (std::chrono::steady_clock::now() > until) isMet = false;
+    });
+    EXPECT_TRUE(isMet);
+    EXPECT_EQ(ended, 0);
+    isOver = true;
+    executor->wait();
+    EXPECT_EQ(ended, 8);
+    EXPECT_EQ(after, 8) << "what reading starts is waited for, too";
 }
 
 TEST(Executor, RunsEverythingOnceWhateverTheThreads) {

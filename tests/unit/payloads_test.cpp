@@ -234,7 +234,7 @@ class Sink final : public streaming::ChunkSink {
   public:
     explicit Sink(const lod::Hierarchy& h) : h_(h) {}
     ~Sink() override { EXPECT_TRUE(alive.empty()) << "chunks leaked"; }
-    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
+    Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
         EXPECT_TRUE(alive.insert(key.chunk).second);
         bytes += chunk.sizeBytes();
         most = std::max(most, bytes);
@@ -268,7 +268,7 @@ TEST_F(Payloads, AreStreamedAndEvictedOneByOne) {
         settings.residentBytes = limit;
         settings.requestsInFlight = 2;
         streaming::Streamer streamer(*executor_, sink, settings);
-        streamer.addSource(h, streaming::makeFileSource(store->file), store->path);
+        streamer.addSource(h, store->file, store->path);
         lod::CutScratch scratch;
         lod::Cut cut;
         for (int frame = 0; frame < 60; ++frame) {

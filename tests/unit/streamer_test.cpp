@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -16,7 +17,7 @@ namespace {
 class CountingSink final : public ChunkSink {
   public:
     ~CountingSink() override { EXPECT_EQ(alive.size(), 0u) << "chunks leaked"; }
-    Result<void> upload(ChunkKey key, const lod::Chunk& chunk) override {
+    Result<void> upload(ChunkKey key, lod::Chunk chunk) override {
         if (refuse) return fail(ErrorKind::budget, "no room in the sink");
         EXPECT_TRUE(alive.insert({key.source, key.chunk}).second);
         bytes += chunk.sizeBytes();
@@ -25,6 +26,7 @@ class CountingSink final : public ChunkSink {
         return {};
     }
     void evict(ChunkKey key) override {
+        if (onEvict) onEvict(key);
         EXPECT_EQ(alive.erase({key.source, key.chunk}), 1u);
         bytes -= sizes[{key.source, key.chunk}];
     }
@@ -32,13 +34,20 @@ class CountingSink final : public ChunkSink {
     std::map<std::pair<uint32_t, uint32_t>, uint64_t> sizes;
     uint64_t bytes = 0, most = 0;
     bool refuse = false;
+    std::function<void(ChunkKey)> onEvict;
 };
 
 class BrokenSource final : public ByteSource {
   public:
-    Result<void> read(uint64_t, void*, size_t) const override {
+    uint64_t sizeBytes() const override { return 0; }
+    const std::string& path() const override { return path_; }
+    uint64_t identity() const override { return 0; }
+    Result<void> readAt(uint64_t, void*, size_t) const override {
         return fail(ErrorKind::input, "the cable is unplugged");
     }
+
+  private:
+    std::string path_ = "cable";
 };
 
 class StreamerTest : public testing::Test {
@@ -71,7 +80,7 @@ TEST_F(StreamerTest, FillsUpAndThenRests) {
     CountingSink sink;
     {
         Streamer streamer(*executor_, sink, {});
-        streamer.addSource(store_->hierarchy, makeFileSource(store_->file), "a");
+        streamer.addSource(store_->hierarchy, store_->file, "a");
         const lod::View view = test::fitView(*store_, 640, 480);
         for (int i = 0; i < 10; ++i) step(streamer, view, 0.1);
         EXPECT_TRUE(cut_.wanted.empty());
@@ -94,7 +103,7 @@ TEST_F(StreamerTest, ResidentBytesEndAtNone) {
     StreamSettings settings;
     settings.residentBytes = 400'000;
     Streamer streamer(*executor_, sink, settings);
-    streamer.addSource(h, makeFileSource(store_->file), "a");
+    streamer.addSource(h, store_->file, "a");
     const lod::View view = test::fitView(*store_, 640, 480);
     for (int i = 0; i < 200; ++i) {
         step(streamer, view, i % 20 < 10 ? 0.5 : 30);
@@ -111,7 +120,7 @@ TEST_F(StreamerTest, TheByteBudgetIsNeverExceededWhateverTheViews) {
         StreamSettings settings;
         settings.residentBytes = 200'000;
         Streamer streamer(*executor_, sink, settings);
-        streamer.addSource(store_->hierarchy, makeFileSource(store_->file), "a");
+        streamer.addSource(store_->hierarchy, store_->file, "a");
         Rng rng(4);
         for (int i = 0; i < 300; ++i) {
             lod::View view = test::fitView(*store_, 640, 480);
@@ -126,6 +135,96 @@ TEST_F(StreamerTest, TheByteBudgetIsNeverExceededWhateverTheViews) {
         }
         EXPECT_GT(streamer.counters().evictions, 0u);
     }
+}
+
+/// By brute force, of each chunk that goes: no other that could go was used less recently.
+TEST_F(StreamerTest, WhatWasUsedLeastRecentlyGoesFirst) {
+    CountingSink sink;
+    const lod::Hierarchy& h = store_->hierarchy;
+    std::map<uint32_t, uint64_t> used;
+    uint64_t frame = 0, wrong = 0, others = 0;
+    const auto isParent = [&](uint32_t chunk) {
+        bool is = false;
+        for (const auto& [source, below] : sink.alive)
+            lod::forEachRequired(h, below, [&](uint32_t above) { is = is || above == chunk; });
+        return is;
+    };
+    Streamer streamer(*executor_, sink, {200'000, 1u << 26, 64});
+    streamer.addSource(h, store_->file, "a");
+    bool isOver = false;
+    sink.onEvict = [&](ChunkKey key) {
+        if (isOver) return;
+        wrong += isParent(key.chunk) || used[key.chunk] >= frame ? 1 : 0;
+        for (const auto& [source, chunk] : sink.alive)
+            if (chunk != key.chunk && !lod::isOfRoot(h, chunk) && !isParent(chunk)) {
+                ++others;
+                wrong += used[chunk] < used[key.chunk] ? 1 : 0;
+            }
+    };
+    Rng rng(6);
+    for (int i = 0; i < 150; ++i) {
+        lod::View view = test::fitView(*store_, 640, 480);
+        view.eye = {rng.uniform(-2, 2), rng.uniform(-2, 2), rng.uniform(-2, 2)};
+        view.forward = glm::normalize(-view.eye);
+        view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0.1, 1, 0)));
+        view.down = glm::cross(view.forward, view.right);
+        const auto before = sink.alive;
+        step(streamer, view, std::exp2(rng.uniform(-1, 4)));
+        for (const auto& [source, chunk] : sink.alive)
+            if (!before.contains({source, chunk})) used[chunk] = frame;
+        ++frame;
+        for (const auto& [source, chunk] : cut_.keep) used[chunk] = frame;
+    }
+    EXPECT_EQ(wrong, 0u);
+    EXPECT_GT(others, 500u);
+    EXPECT_GT(streamer.counters().evictions, 50u);
+    isOver = true;
+}
+
+TEST_F(StreamerTest, WhatNobodyWantsAnyMoreIsNotUploaded) {
+    CountingSink sink;
+    Streamer streamer(*executor_, sink, {});
+    streamer.addSource(store_->hierarchy, store_->file, "a");
+    lod::View view = test::fitView(*store_, 640, 480);
+    for (int i = 0; i < 10; ++i) step(streamer, view, 30);
+    const size_t before = sink.alive.size();
+    // What this frame asks for arrives after the next one has asked for nothing of it.
+    streamer.collect();
+    streamer.upload();
+    lod::selectCut({hierarchies_, instances_, {}}, streamer.residency(), view, {0.1}, scratch_, cut_);
+    streamer.request(cut_);
+    const uint32_t asked = streamer.counters().inFlight;
+    EXPECT_GT(asked, 3u);
+    lod::selectCut({hierarchies_, instances_, {}}, streamer.residency(), view, {30}, scratch_, cut_);
+    streamer.request(cut_);
+    executor_->wait();
+    streamer.collect();
+    streamer.upload();
+    EXPECT_EQ(streamer.counters().unwanted, asked);
+    EXPECT_EQ(sink.alive.size(), before);
+    for (int i = 0; i < 20; ++i) step(streamer, view, 0.1);
+    EXPECT_TRUE(cut_.wanted.empty()) << "asked for again, they come";
+    EXPECT_EQ(streamer.counters().unwanted, asked);
+}
+
+TEST_F(StreamerTest, StreamsFromMemoryToo) {
+    const auto bytes = readWhole(store_->path);
+    ASSERT_TRUE(bytes);
+    const auto memory = std::make_shared<const MemorySource>("in memory", *bytes);
+    const auto store = lod::openStore(memory);
+    ASSERT_TRUE(store) << store.error().line();
+    EXPECT_EQ(store->contentHash, store_->contentHash);
+    CountingSink sink;
+    Streamer streamer(*executor_, sink, {});
+    streamer.addSource(store->hierarchy, store->file, "a");
+    const lod::View view = test::fitView(*store_, 640, 480);
+    for (int i = 0; i < 20; ++i) step(streamer, view, 0.1);
+    EXPECT_TRUE(cut_.wanted.empty());
+    const auto cut = std::make_shared<const MemorySource>(
+        "half", std::vector<uint8_t>(bytes->begin(), bytes->begin() + static_cast<std::ptrdiff_t>(bytes->size() / 2)));
+    const auto half = lod::openStore(cut);
+    ASSERT_FALSE(half);
+    EXPECT_NE(half.error().line().find("half"), std::string::npos);
 }
 
 TEST_F(StreamerTest, AFailedChunkIsCountedAndTriedAgainLater) {
@@ -150,7 +249,7 @@ TEST_F(StreamerTest, ASinkThatIsFullDoesNotStall) {
     CountingSink sink;
     sink.refuse = true;
     Streamer streamer(*executor_, sink, {});
-    streamer.addSource(store_->hierarchy, makeFileSource(store_->file), "a");
+    streamer.addSource(store_->hierarchy, store_->file, "a");
     const lod::View view = test::fitView(*store_, 640, 480);
     for (int i = 0; i < 5; ++i) step(streamer, view, 0.1);
     EXPECT_GT(streamer.counters().failures, 0u);
