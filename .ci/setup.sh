@@ -5,11 +5,12 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 say() { printf '%s\n' "$*" >&2; }
 
-# install_packages [full]: without `full`, what follows the mark "only ./test --full" is left out.
+# install_packages run|test|full: what running needs; what the tests need, too; what ./test --full needs, too.
 install_packages() {
-    local wanted missing=()
-    wanted=$(if [ "${1:-}" = full ]; then cat .ci/packages.txt; else sed '/^# only .\/test --full/,$d' .ci/packages.txt; fi |
-        grep -v '^#')
+    local wanted missing=() before='^no such mark'
+    [ "$1" = run ] && before='^# what the tests need'
+    [ "$1" = test ] && before='^# only .\/test --full'
+    wanted=$(sed "/$before/,\$d" .ci/packages.txt | grep -v '^#')
     if ! command -v dpkg-query >/dev/null; then
         say "This is not a Debian system. Stipple needs these packages (names as in Debian 12):"
         say "$(printf '%s ' $wanted)"
@@ -33,15 +34,29 @@ install_packages() {
     DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# build PRESET [cmake options]: configures once, builds, quiet unless it fails.
+# build_program: what ./run needs and no more: a test that is not compiled keeps nobody waiting.
+build_program() {
+    [ -f build/build.ninja ] || configure release -DBUILD_TESTING=OFF || return 1
+    compile build --target stipple
+}
+
+# build_preset PRESET: all of it, with the tests.
 build_preset() {
-    local preset=$1 folder=build log
-    log=$(mktemp)
-    shift
-    [ "$preset" = release ] || folder=build-$preset
-    if [ ! -f "$folder/build.ninja" ] || [ $# -gt 0 ]; then
-        cmake --preset "$preset" "$@" >"$log" 2>&1 || { cat "$log" >&2; return 1; }
-        rm -f "$log"
+    local folder=build-$1
+    [ "$1" = release ] && folder=build
+    if [ ! -f "$folder/build.ninja" ] || grep -q '^BUILD_TESTING:BOOL=OFF' "$folder/CMakeCache.txt"; then
+        configure "$1" -DBUILD_TESTING=ON || return 1
     fi
-    if [ -t 2 ]; then cmake --build "$folder" >&2; else cmake --build "$folder" -- --quiet >&2; fi
+    compile "$folder"
+}
+
+# configure PRESET [cmake options]; compile FOLDER [cmake options]: quiet unless they fail.
+configure() {
+    local log
+    log=$(mktemp)
+    cmake --preset "$@" >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+    rm -f "$log"
+}
+compile() {
+    if [ -t 2 ]; then cmake --build "$@" >&2; else cmake --build "$@" -- --quiet >&2; fi
 }
