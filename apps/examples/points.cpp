@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
     settings.listener.progress = [](const stipple::Progress& p) {
         std::fprintf(stderr, "\r%3.0f %% %s", 100 * p.fraction, p.stage.c_str());
     };
-    const auto built = stipple::build(ball, argv[1], settings);
+    const auto built = stipple::buildPoints(ball, argv[1], settings);
     if (!built) return std::fprintf(stderr, "%s\n", built.error().line().c_str()), static_cast<int>(built.error().kind);
     const auto store = stipple::Store::open(argv[1]);
     if (!store) return std::fprintf(stderr, "%s\n", store.error().line().c_str()), static_cast<int>(store.error().kind);

@@ -116,7 +116,7 @@ Result<BuildReport> build(const std::vector<std::string>& inputs, const std::str
     });
 }
 
-Result<BuildReport> build(const PointSource& source, const std::string& store, const BuildSettings& settings) {
+Result<BuildReport> buildPoints(const PointSource& source, const std::string& store, const BuildSettings& settings) {
     if (!source.read || source.parts.empty())
         return Error{ErrorKind::usage, "has no points to read", source.name, "set parts and read"};
     return run(store, settings,

@@ -198,7 +198,7 @@ TEST_F(Api, PointsOfAProgramAreBuilt) {
         EXPECT_GE(p.fraction, fraction);
         fraction = p.fraction;
     };
-    const auto built = stipple::build(grid(), at("grid.stipple"), settings);
+    const auto built = stipple::buildPoints(grid(), at("grid.stipple"), settings);
     ASSERT_TRUE(built) << built.error().line();
     EXPECT_EQ(built->in, 8000u);
     EXPECT_EQ(built->kept, 8000u);
@@ -225,19 +225,19 @@ TEST_F(Api, ASourceThatFailsOrBreaksItsWordLeavesNothingBehind) {
     source.read = [](size_t, uint64_t, uint64_t, stipple::Points&) -> stipple::Result<void> {
         return stipple::Error{ErrorKind::input, "the sensor is unplugged", "port 3", ""};
     };
-    const auto failed = stipple::build(source, at("a.stipple"));
+    const auto failed = stipple::buildPoints(source, at("a.stipple"));
     ASSERT_FALSE(failed);
     EXPECT_EQ(failed.error().what, "the sensor is unplugged");
     source = grid();
     source.hasNormal = true;
-    const auto short_ = stipple::build(source, at("a.stipple"));
+    const auto short_ = stipple::buildPoints(source, at("a.stipple"));
     ASSERT_FALSE(short_);
     EXPECT_EQ(short_.error().kind, ErrorKind::input);
     source.read = nullptr;
-    EXPECT_FALSE(stipple::build(source, at("a.stipple")));
+    EXPECT_FALSE(stipple::buildPoints(source, at("a.stipple")));
     stipple::BuildSettings stopped;
     stopped.listener.isStopped = [] { return true; };
-    const auto ended = stipple::build(grid(), at("a.stipple"), stopped);
+    const auto ended = stipple::buildPoints(grid(), at("a.stipple"), stopped);
     ASSERT_FALSE(ended);
     EXPECT_EQ(ended.error().kind, ErrorKind::interrupted);
     EXPECT_FALSE(fs::exists(at("a.stipple")));

@@ -12,6 +12,10 @@ fail() { echo "installed.sh: $*" >&2; exit 1; }
 cmake --install "$build" --prefix "$work/usr" >"$work/install.log" || { cat "$work/install.log"; exit 1; }
 [ -z "$(find "$work/usr/include" -name '*.h' | xargs grep -lE '#include [<"](glm|tl/|engine|lod|fmt|nlohmann|CLI)')" ] ||
     fail 'public headers bring others along'
+for header in "$work"/usr/include/stipple/*.h; do
+    g++ -std=c++20 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -fsyntax-only -I"$work/usr/include" -x c++ "$header" ||
+        fail "$header does not stand alone"
+done
 lib=$(find "$work/usr" -name libstipple.so)
 # What it shows are its own names, and what every program may have of the C++ library.
 nm -DC --defined-only "$lib" | grep -vE ' (stipple::v1::|(vtable|typeinfo|typeinfo name) for stipple::v1::|stipple_[a-z_]+$)' |

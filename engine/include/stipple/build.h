@@ -59,7 +59,7 @@ struct PointSource {
     std::function<Result<void>(size_t part, uint64_t first, uint64_t count, Points& to)> read;
 };
 
-STIPPLE_API Result<BuildReport> build(const PointSource& source, const std::string& store,
-                                      const BuildSettings& settings = {});
+STIPPLE_API Result<BuildReport> buildPoints(const PointSource& source, const std::string& store,
+                                            const BuildSettings& settings = {});
 
 }  // namespace stipple::v1
