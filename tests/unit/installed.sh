@@ -13,7 +13,8 @@ cmake --install "$build" --prefix "$work/usr" >"$work/install.log" || { cat "$wo
 [ -z "$(find "$work/usr/include" -name '*.h' | xargs grep -lE '#include [<"](glm|tl/|engine|lod|fmt|nlohmann|CLI)')" ] ||
     fail 'public headers bring others along'
 for header in "$work"/usr/include/stipple/*.h; do
-    g++ -std=c++20 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -fsyntax-only -I"$work/usr/include" -x c++ "$header" ||
+    echo "#include <stipple/$(basename "$header")>" |
+        g++ -std=c++20 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -fsyntax-only -I"$work/usr/include" -x c++ - ||
         fail "$header does not stand alone"
 done
 lib=$(find "$work/usr" -name libstipple.so)
