@@ -74,7 +74,7 @@ int run(std::vector<std::string> arguments) {
         return 0;
     }
     if (arguments.front() == "--version") {
-        fmt::print("stipple {}\n{}", STIPPLE_VERSION, app::listDevices());
+        fmt::print("stipple {}\n{}", STIPPLE_VERSION, listDevices());
         return 0;
     }
     if (const auto complete = app::completeCommand(app, arguments); !complete) return app::report(complete.error());
