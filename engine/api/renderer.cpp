@@ -134,6 +134,7 @@ FrameInfo infoOf(const FrameCounters& c) {
 
 /// What it keeps on the device goes: not while somebody draws there, whose frame ends soon.
 Renderer::Held::~Held() {
+    if (!state) return;  // it was never made, by who has the device now
     for (;;) {
         const Turn mine(*device);
         if (mine) {
