@@ -209,8 +209,9 @@ void printVector(const nlohmann::json& j, const char* key, const char* label) {
     for (size_t a = 0; a < 3; ++a) {
         const bool isOnLattice = j.contains("scale") && key[0] == 'm';  // least and greatest place
         const double v = j[key][a].get<double>();
-        text += " " + (isOnLattice ? latticeText(v, j["scale"][a].get<double>(), j["offset"][a].get<double>())
-                                   : fmt::format("{:.15g}", v));
+        text += ' ';
+        text += isOnLattice ? latticeText(v, j["scale"][a].get<double>(), j["offset"][a].get<double>())
+                            : fmt::format("{:.15g}", v);
     }
     fmt::print("  {:15}{}\n", label, text);
 }

@@ -162,22 +162,22 @@ TEST_F(StreamerTest, WhatWasUsedLeastRecentlyGoesFirst) {
             }
     };
     Rng rng(6);
-    for (int i = 0; i < 150; ++i) {
+    for (int i = 0; i < 400; ++i) {
         lod::View view = test::fitView(*store_, 640, 480);
         view.eye = {rng.uniform(-2, 2), rng.uniform(-2, 2), rng.uniform(-2, 2)};
         view.forward = glm::normalize(-view.eye);
         view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0.1, 1, 0)));
         view.down = glm::cross(view.forward, view.right);
         const auto before = sink.alive;
-        step(streamer, view, std::exp2(rng.uniform(-1, 4)));
+        step(streamer, view, std::exp2(rng.uniform(-2, 2)));
         for (const auto& [source, chunk] : sink.alive)
             if (!before.contains({source, chunk})) used[chunk] = frame;
         ++frame;
         for (const auto& [source, chunk] : cut_.keep) used[chunk] = frame;
     }
     EXPECT_EQ(wrong, 0u);
-    EXPECT_GT(others, 500u);
-    EXPECT_GT(streamer.counters().evictions, 50u);
+    EXPECT_GT(others, 100u);
+    EXPECT_GT(streamer.counters().evictions, 30u);
     isOver = true;
 }
 
