@@ -438,6 +438,19 @@ void addReading(CLI::App& sub, Options& o) {
         ->capture_default_str();
 }
 
+/// What is behind the scene, and how colours are written.
+void addPictureTo(CLI::App& sub, Options& o) {
+    auto* const background =
+        sub.add_option("--background", o.background, "colour behind the scene, sRGB, 0 to 255 each")
+            ->type_name("R,G,B")
+            ->capture_default_str();
+    sub.add_flag("--alpha", o.alpha, "no background: how much of a pixel is covered goes into the alpha channel")
+        ->excludes(background);
+    sub.add_option("--transfer", o.transfer, "how colours of a .png are encoded, which it says itself")
+        ->check(oneOf({"srgb", "rec709"}))
+        ->capture_default_str();
+}
+
 }  // namespace
 
 void setupRender(CLI::App& app, int& status) {
@@ -473,15 +486,7 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--shade", o->shade, "auto: unlit where the scan has its own colours, lit by sun and sky otherwise")
         ->check(oneOf({"auto", "lit", "unlit"}))
         ->capture_default_str();
-    auto* const background =
-        sub->add_option("--background", o->background, "colour behind the scene, sRGB, 0 to 255 each")
-            ->type_name("R,G,B")
-            ->capture_default_str();
-    sub->add_flag("--alpha", o->alpha, "no background: how much of a pixel is covered goes into the alpha channel")
-        ->excludes(background);
-    sub->add_option("--transfer", o->transfer, "how colours of a .png are encoded, which it says itself")
-        ->check(oneOf({"srgb", "rec709"}))
-        ->capture_default_str();
+    addPictureTo(*sub, *o);
     sub->add_option("--debug", o->debug, "draw what the engine did instead of colours")
         ->check(oneOf({"none", "level", "error", "holes", "normals"}))
         ->capture_default_str();

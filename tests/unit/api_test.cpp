@@ -19,12 +19,22 @@ namespace {
 namespace fs = std::filesystem;
 using stipple::ErrorKind;
 
+struct Cache {
+    Cache() {
+        std::string pattern = (fs::temp_directory_path() / "stipple-api-XXXXXX").string();
+        folder = ::mkdtemp(pattern.data());
+        ::setenv("XDG_CACHE_HOME", folder.c_str(), 1);
+    }
+    ~Cache() { fs::remove_all(folder); }
+    fs::path folder;
+};
+
 class Api : public testing::Test {
   protected:
     Api() {
         std::string pattern = (fs::temp_directory_path() / "stipple-api-XXXXXX").string();
         folder_ = ::mkdtemp(pattern.data());
-        ::setenv("XDG_CACHE_HOME", (folder_ / "cache").c_str(), 1);
+        static const Cache cache;  // a process has one
     }
     ~Api() override { fs::remove_all(folder_); }
     std::string at(const std::string& name) const { return (folder_ / name).string(); }
@@ -66,9 +76,9 @@ TEST_F(Api, DrawsThePicturesOfTheProgram) {
     ASSERT_EQ(std::system(command.c_str()), 0);
     EXPECT_TRUE(bytesOf(at("own.png")) == bytesOf(at("program.png")));
     EXPECT_GT(bytesOf(at("own.png")).size(), 1000u);
-    // The control: another accuracy is another picture.
+    // The control: another mode is another picture.
     stipple::RenderSettings coarse;
-    coarse.errorPixels = 16;
+    coarse.mode = "points";
     const auto other = r.render(scene.overview(160.0 / 90), 160, 90, coarse);
     ASSERT_TRUE(other);
     EXPECT_NE(other->rgba, image->rgba);
