@@ -19,9 +19,9 @@ for header in "$work"/usr/include/stipple/*.h; do
 done
 lib=$(find "$work/usr" -name libstipple.so)
 # What it shows are its own names, and what every program may have of the C++ library.
-nm -DC --defined-only "$lib" | grep -vE ' (stipple::v1::|(vtable|typeinfo|typeinfo name) for stipple::v1::|stipple_[a-z_]+$)' |
-    grep -E ' [TDB] ' >"$work/names" && fail "other names are shown: $(head -5 "$work/names")"
-nm -DC --defined-only "$lib" | grep -q 'stipple::v1::Renderer::render(' || fail 'no names are shown'
+nm -DC --defined-only "$lib" >"$work/names"
+grep -q 'stipple::v1::Renderer::render(' "$work/names" || fail 'no names are shown'
+grep -E ' [TDB] ' "$work/names" | grep -vE ' (stipple::v1::|stipple_[a-z_]+$)' >"$work/others" && fail "other names are shown: $(head -5 "$work/others")"
 
 # Away from the build tree: the module of pictures has to be found beside the library.
 cp -r "$source/apps/examples" "$work/examples"
@@ -66,7 +66,7 @@ if(options)
 endif()
 END
 cmake -S "$work/host" -B "$work/host/build" -G Ninja >"$work/host.log" 2>&1 || { cat "$work/host.log"; exit 1; }
-ninja -C "$work/host/build" -n picture >"$work/plan" || fail 'the host cannot be built'
+ninja -C "$work/host/build" -t commands picture >"$work/plan" || fail 'the host cannot be built'
 grep -q 'engine/api' "$work/plan" || fail 'the host does not build the library'
 if [ "${STIPPLE_BUILD_INCLUDED:-0}" = 1 ]; then
     ninja -C "$work/host/build" picture >"$work/host.log" 2>&1 || { tail -50 "$work/host.log"; exit 1; }
