@@ -40,6 +40,19 @@ class Level {
         for (uint32_t s = x / kSegment; s <= (x + n - 1) / kSegment; ++s) any = any || row[s] != 0;
         return any;
     }
+    /// The same of a tile: columns [x0, x0 + n), rows [row0, row1).
+    bool mayHoldTile(uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) const {
+        bool any = false;
+        for (uint32_t y = row0; y < row1; ++y) any = any || mayHold(y, x0, n);
+        return any;
+    }
+    /// Of the parents of a tile of the next finer level and, if `besideToo`, those beside them.
+    bool mayHoldParents(uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1, bool besideToo) const {
+        const uint32_t beside = besideToo ? 1 : 0, left = x0 / 2 - std::min(x0 / 2, beside),
+                       top = row0 / 2 - std::min(row0 / 2, beside), right = std::min((x0 + n + 1) / 2 + beside, width),
+                       bottom = std::min((row1 + 1) / 2 + beside, height);
+        return mayHoldTile(left, right - left, top, bottom);
+    }
     /// They may from now on. `x`: a multiple of kSegment.
     void hold(uint32_t y, uint32_t x, uint32_t n) { set(y, x, n, 1); }
     /// None is there.

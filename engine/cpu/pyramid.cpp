@@ -37,6 +37,7 @@ void Pyramid::pull() {
         Level &fine = levels_[l], &coarse = levels_[l + 1];
         const Planes from = fine.planes();
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+            if (!fine.mayHoldTile(x0, n, row0, row1) && !coarse.mayHoldParents(x0, n, row0, row1, false)) return;
             TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
             upper.hasTubes = lower.hasTubes = out.hasTubes = hasCurves_;
             upper.hasMaterials = lower.hasMaterials = out.hasMaterials = hasMaterials_;
@@ -98,6 +99,7 @@ void Pyramid::push() {
         Level &fine = levels_[l], &coarse = levels_[l + 1];
         const Planes planes = fine.planes();
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+            if (!fine.mayHoldTile(x0, n, row0, row1) && !coarse.mayHoldParents(x0, n, row0, row1, true)) return;
             pushTile(fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1,
                      [&](uint32_t y, const TexelRow&, const TexelRow& row, bool any) {
                          if (!any) return;

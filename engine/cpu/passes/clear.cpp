@@ -10,10 +10,10 @@ void resize(Frame& frame) {
     frame.image->width = w;
     frame.image->height = h;
     const size_t pixels = size_t{w} * h;
-    frame.image->rgba.resize(pixels);
-    frame.image->depth.resize(frame.wantAll ? pixels : 0);
-    frame.image->normal.resize(frame.wantAll ? pixels * 3 : 0);
-    frame.image->linear.resize(frame.wantAll ? pixels * 3 : 0);
+    resizeHuge(frame.image->rgba, pixels);
+    resizeHuge(frame.image->depth, frame.wantAll ? pixels : 0);
+    resizeHuge(frame.image->normal, frame.wantAll ? pixels * 3 : 0);
+    resizeHuge(frame.image->linear, frame.wantAll ? pixels * 3 : 0);
     frame.pyramid.resize(w, h, frame.constants.hasMaterials != 0);
     if (frame.hasSmooth) frame.pixels.fit(w, h, frame.constants.hasMaterials != 0);
     if (frame.visibilityPixels == pixels) return;  // it is clear whatever its shape

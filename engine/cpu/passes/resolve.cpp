@@ -29,6 +29,14 @@ void preparePlanes(Frame& frame, size_t pixels) {
     fit(frame.emissive, frame.emissivePixels, frame.hasEmissive);
 }
 
+/// Does a tile show something, or do its texels hold what older frames have left?
+bool isTouched(const Frame& frame, const Level& fine, const Level* coarse, uint32_t x0, uint32_t n, uint32_t row0,
+               uint32_t row1) {
+    return frame.isSeen(size_t{row0} * fine.width, (row1 - row0) * fine.width) ||  // its whole band
+           fine.mayHoldTile(x0, n, row0, row1) ||
+           (coarse != nullptr && coarse->mayHoldParents(x0, n, row0, row1, false));
+}
+
 /// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
 void resolve(Frame& frame) {
     Level& fine = frame.texels();
@@ -53,6 +61,7 @@ void resolve(Frame& frame) {
                              .ofKind = ofKind.data()};
     std::atomic<float> largestRadius{0};
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+        if (!isTouched(frame, fine, coarse, x0, n, row0, row1)) return;
         TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
         upper.hasTubes = lower.hasTubes = out.hasTubes = frame.hasCurves;
         upper.hasMaterials = lower.hasMaterials = out.hasMaterials = frame.constants.hasMaterials != 0;

@@ -5,6 +5,7 @@
 
 #include "engine/cpu/passes/passes.h"
 #include "engine/cpu/passes/seconds.h"
+#include "engine/cpu/passes/shown_tiles.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/occlusion.h"
 #include "shaders/shared/pack.h"
@@ -12,23 +13,23 @@
 namespace stipple::cpu {
 namespace {
 
-/// What an empty row of a tile looks like.
-struct ShadedRow {
+/// What a pixel without anything looks like.
+struct EmptyPixel {
     std::array<uint32_t, kTile> rgba{};
     std::array<float, size_t{3} * kTile> linear{};
-    void copyTo(const ShadeOutput& out, uint32_t n) const {
-        std::copy_n(rgba.begin(), n, out.rgba);
+    void fill(const ShadeOutput& out, size_t n) const {
+        std::fill_n(out.rgba, n, rgba.front());
         if (out.depth) std::fill_n(out.depth, n, 0.0f);
         if (out.normal) std::fill_n(out.normal, 3 * n, 0.0f);
-        if (out.linear) std::copy_n(linear.begin(), 3 * n, out.linear);
+        for (size_t i = 0; out.linear && i < n; ++i) std::copy_n(linear.begin(), 3, out.linear + 3 * i);
     }
 };
-ShadedRow emptyRow(const Frame& frame) {
-    ShadedRow shaded;
+EmptyPixel emptyPixel(const Frame& frame) {
+    EmptyPixel pixel;
     static const SurfaceRow kNothing{};
     frame.k.outputRow(frame.constants, frame.tables, kTile, kNothing,
-                      {shaded.rgba.data(), nullptr, nullptr, shaded.linear.data()});
-    return shaded;
+                      {pixel.rgba.data(), nullptr, nullptr, pixel.linear.data()});
+    return pixel;
 }
 
 ShadeOutput outputAt(Frame& frame, size_t pixel) {
@@ -68,7 +69,7 @@ class RowProgram {
           fine_(frame.texels()),
           isKept_(!render::passInfo(passes.back()).writes.has(render::Plane::image)),
           isFirst_(passes.front() == render::Pass::surface),
-          empty_(emptyRow(frame)) {
+          empty_(emptyPixel(frame)) {
         for (const render::Pass pass : passes)
             if (pass != render::Pass::surface) steps_.push_back({&cpuPassOf(pass).row, takesMixed(pass)});
         for (const render::Pass pass : later) {
@@ -115,6 +116,11 @@ class RowProgram {
         surface.shadowSlots = 0;
         if (!takeRow(at, planes, wantsOf(planes), surface)) return finishEmpty(at);
         finish(at, planes, surface);
+    }
+
+    /// What shows nothing.
+    void finishEmpty(const TileRect& rect) const {
+        for (uint32_t y = rect.row0; y < rect.row1; ++y) finishEmpty(placeOf(rect.x0, rect.n, y));
     }
 
   private:
@@ -175,7 +181,7 @@ class RowProgram {
     }
     void finishEmpty(const RowPlace& at) const {
         if (isKept_ && isFirst_) std::fill_n(keptAt(frame_, at.first).depth, at.n, 0.0f);
-        if (!isKept_) empty_.copyTo(outputAt(frame_, at.first), at.n);
+        if (!isKept_) empty_.fill(outputAt(frame_, at.first), at.n);
     }
 
     Frame& frame_;
@@ -183,7 +189,7 @@ class RowProgram {
     bool isKept_;
     bool isFirst_;         ///< surfaces are made in this run; else an earlier one has kept them
     SurfaceWants kept_{};  ///< of later passes
-    ShadedRow empty_;
+    EmptyPixel empty_;
     std::vector<Step> steps_;  ///< after the surface
 };
 
@@ -196,6 +202,13 @@ bool showsWide(Frame& frame, const Level& shown, uint32_t x0, uint32_t n, uint32
     return false;
 }
 
+/// May any pixel show something? Of a pyramid the last push reads the parents of a tile's texels and those beside them.
+bool mayShow(Frame& frame, const TileRect& r) {
+    return frame.texels().mayHoldTile(r.x0, r.n, r.row0, r.row1) ||
+           (frame.hasPyramid && frame.pyramid.isUsed() &&
+            frame.pyramid.level(1).mayHoldParents(r.x0, r.n, r.row0, r.row1, true));
+}
+
 }  // namespace
 
 void runRows(Frame& frame, std::span<const render::Pass> passes, std::span<const render::Pass> later) {
@@ -203,7 +216,10 @@ void runRows(Frame& frame, std::span<const render::Pass> passes, std::span<const
     const Planes planes = fine.planes();
     const RowProgram program(frame, passes, later);
     const bool isFromTexels = passes.front() == render::Pass::surface;
-    frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+    const auto shows = [&](const TileRect& r) { return mayShow(frame, r); };
+    const auto empty = [&](const TileRect& r) { program.finishEmpty(r); };
+    forShownTiles(frame.executor, fine.width, fine.height, shows, empty, [&](const TileRect& rect) {
+        const auto [x0, n, row0, row1] = rect;
         if (!isFromTexels) {
             for (uint32_t y = row0; y < row1; ++y) program.resume(x0, n, y);
             return;
