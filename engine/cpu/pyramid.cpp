@@ -58,13 +58,12 @@ void Pyramid::pull() {
 bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, uint32_t first,
                       TexelRow& row) const {
     const Planes at = planes.at(size_t{y} * level.width + x);
-    bool any = false;
-    uint32_t signs = 0;
-    for (uint32_t i = 0; level.mayHold(y, x, n) && i < n; ++i) {
-        any |= at.depth[i] > 0;
-        signs |= at.depth[i] > 0 ? at.size[i] : 0u;
-    }
-    row.hasTubes = hasCurves_ && (signs & 0x80008000u) != 0;
+    const bool mayHold = level.mayHold(y, x, n);
+    uint32_t anyThere = 0, signs = 0;
+    for (uint32_t i = 0; mayHold && i < n; ++i) anyThere |= at.depth[i] > 0 ? 1u : 0u;
+    for (uint32_t i = 0; hasCurves_ && anyThere != 0 && i < n; ++i) signs |= at.depth[i] > 0 ? at.size[i] : 0u;
+    const bool any = anyThere != 0;
+    row.hasTubes = (signs & 0x80008000u) != 0;
     if (any)
         k_.unpackRow(at, first, n, row);
     else

@@ -32,6 +32,9 @@ void project(Frame& frame) {
     frame.executor.parallelFor(frame.blocks.size(), 32, [&](size_t begin, size_t end) {
         alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
         std::vector<shared::WideDisc> mine;
+        // (At hand: after each atomic store they would be read again.)
+        uint64_t* const keys = frame.visibility.data();
+        uint8_t* const runs = frame.runs.data();
         for (size_t b = begin; b < end; ++b) {
             if (frame.isSmoothing && (frame.blocks[b].node->octantMask & shared::kNodeSmooth) == 0) continue;
             const uint32_t count =
@@ -41,7 +44,7 @@ void project(Frame& frame) {
             constexpr uint32_t kAhead = 48;  // the pixels are scattered over 16 MB: ask for them in time
             for (uint32_t i = 0; i < count; ++i) {
                 if (i + kAhead < count && pixel[i + kAhead] < kWidePixel)
-                    __builtin_prefetch(&frame.visibility[pixel[i + kAhead]], 1);
+                    __builtin_prefetch(&keys[pixel[i + kAhead]], 1);
                 if (pixel[i] >= kWidePixel) {
                     if (pixel[i] == ~0u) continue;
                     const auto id = static_cast<uint32_t>(b) * shared::kRecordsPerBlock + i;
@@ -52,9 +55,9 @@ void project(Frame& frame) {
                     continue;
                 }
                 const uint64_t key = shared::visibilityKey(depth[i], shared::drawId(static_cast<uint32_t>(b), i));
-                const std::atomic_ref<uint8_t> run(frame.runs[pixel[i] >> Visibility::kRunBits]);
+                const std::atomic_ref<uint8_t> run(runs[pixel[i] >> Visibility::kRunBits]);
                 if (run.load(std::memory_order_relaxed) == 0) run.store(1, std::memory_order_relaxed);
-                const std::atomic_ref<uint64_t> entry(frame.visibility[pixel[i]]);
+                const std::atomic_ref<uint64_t> entry(keys[pixel[i]]);
                 uint64_t old = entry.load(std::memory_order_relaxed);
                 while (key < old && !entry.compare_exchange_weak(old, key, std::memory_order_relaxed)) {
                 }
