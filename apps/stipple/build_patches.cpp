@@ -9,7 +9,7 @@
 #include "apps/stipple/options.h"
 #include "engine/base/hash.h"
 #include "engine/base/words.h"
-#include "engine/scene/open/ply_meshes.h"
+#include "engine/scene/open/mesh_files.h"
 #include "engine/scene/place_looks.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/patch_store/patch_store_build.h"
@@ -68,24 +68,22 @@ Result<lod::BuildReport> ofScans(const std::vector<std::string>& inputs, const s
     return lod::buildScanStore(inputs, output, settings, executor, progress);
 }
 
-Result<lod::BuildReport> ofPly(const std::vector<std::string>& files, const std::string& output,
-                               const BuildOptions& build, Executor& executor, Progress& progress) {
+Result<lod::BuildReport> ofMeshes(const std::vector<std::string>& files, const std::string& output,
+                                  const BuildOptions& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(lod::PatchBuildSettings settings, settingsOf(build));
-    const std::string& temp = settings.limits.tempFolder;
-    const std::string folder = temp.empty() ? fs::absolute(output).parent_path().string() : temp;
     settings.readerShare = 0.25;
-    const auto forVertices =
+    const auto forReader =
         static_cast<uint64_t>(settings.readerShare * static_cast<double>(settings.limits.memoryBytes));
-    std::vector<lod::MeshSource> sources;
-    for (const std::string& file : files) {
-        STIPPLE_ASSIGN(lod::MeshSource source, lod::openPlyMesh(file, forVertices / files.size(), folder));
-        sources.push_back(std::move(source));
-    }
+    lod::FormatOptions more = build.formatOptions();
+    if (more.tempFolder.empty()) more.tempFolder = fs::absolute(output).parent_path().string();
+    more.memoryBytes = forReader;
+    STIPPLE_ASSIGN(const lod::OpenedMesh mesh, scene::openMeshes(files, more));
     settings.description.source = fs::path(files.front()).filename().string();
     if (files.size() > 1) settings.description.source += fmt::format(" and {} more", files.size() - 1);
-    settings.limits.memoryBytes -= forVertices;
-    return lod::buildPatchStore(sources.size() == 1 ? sources.front() : lod::joined(std::move(sources)), output,
-                                settings, executor, progress);
+    settings.limits.memoryBytes -= forReader;
+    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildPatchStore(mesh.source, output, settings, executor, progress));
+    report.notes.insert(report.notes.begin(), mesh.notes.begin(), mesh.notes.end());
+    return report;
 }
 
 /// What a scene's materials and textures say, in memory as long as the build.
@@ -165,7 +163,9 @@ Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::R
         STIPPLE_ASSIGN(scene, scene::readScene(input, reading));
         source = scene::triangleSource(scene, scene::placements(scene));
     } else {
-        STIPPLE_ASSIGN(source, lod::openPlyMesh(input, reading.memoryBytes, fs::temp_directory_path().string()));
+        STIPPLE_ASSIGN(lod::OpenedMesh mesh,
+                       lod::openMesh(input, {.memoryBytes = reading.memoryBytes, .openingBytes = reading.memoryBytes}));
+        source = std::move(mesh.source);
     }
     STIPPLE_ASSIGN(lod::TriangleMesh all, collect(source));
     if (all.indices.empty()) return noTriangles(input);
@@ -174,8 +174,8 @@ Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::R
 
 bool hasTriangles(const std::string& input) {
     if (scene::isSceneFile(input)) return true;
-    const auto faces = lod::plyFaces(input);
-    return faces && faces->any();
+    const auto hasMesh = lod::hasMesh(input, {});
+    return hasMesh && *hasMesh;
 }
 
 Result<std::vector<glm::dvec3>> readPlaces(const std::string& input, const scene::ReadSettings& reading) {
@@ -236,9 +236,9 @@ Result<lod::BuildReport> buildPatches(const std::vector<std::string>& inputs, co
             return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
         return ofScene(inputs.front(), output, build, executor, progress);
     }
-    STIPPLE_ASSIGN(const scene::PlyMeshes meshes, scene::findPlyMeshes(inputs, build));
+    STIPPLE_ASSIGN(const scene::MeshFiles meshes, scene::findMeshFiles(inputs, build));
     if (!meshes.areAll()) return ofScans(inputs, output, build, executor, progress);
-    STIPPLE_ASSIGN(lod::BuildReport report, ofPly(meshes.files, output, build, executor, progress));
+    STIPPLE_ASSIGN(lod::BuildReport report, ofMeshes(meshes.files, output, build, executor, progress));
     report.notes.insert(report.notes.begin(), meshes.notes.begin(), meshes.notes.end());
     return report;
 }

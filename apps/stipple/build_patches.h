@@ -19,7 +19,7 @@ Result<std::vector<glm::dvec3>> readPlaces(const std::string& input, const scene
 /// Has the input triangles? (It may be no file: a folder or an octree of scans.)
 bool hasTriangles(const std::string& input);
 
-/// All triangles of a PLY file with faces or of a scene. Error: there are none.
+/// All triangles of a file that has some or of a scene. Error: there are none.
 Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::ReadSettings& reading);
 
 /// For --json; null where there are none.

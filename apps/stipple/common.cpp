@@ -60,7 +60,7 @@ void BuildOptions::addTo(CLI::App& app) {
                    "radius of curves that have none, file units (0: a 4000th of the extent)")
         ->transform(within(0.0, 1e300));
     addOutliersTo(app);
-    app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
+    addFormatsTo(app);
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
 
@@ -98,6 +98,18 @@ void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair) {
     app.add_flag("--repair", repair,
                  "is always done: faults of a glTF file that can be drawn are noted and passed over")
         ->group("");
+}
+
+void BuildOptions::addFormatsTo(CLI::App& app) {
+    app.add_flag("--only-points", onlyPoints,
+                 "of what could be triangles take points: of PLY the vertices, of level sets discs on their surface");
+    addGridTo(app);
+}
+
+void BuildOptions::addGridTo(CLI::App& app) {
+    app.add_option("--grid", grid,
+                   "of files that hold several (.vdb): the one to take (default: all that can be drawn)")
+        ->type_name("NAME");
 }
 
 void BuildOptions::addOutliersTo(CLI::App& app) {

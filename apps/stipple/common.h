@@ -46,6 +46,9 @@ struct BuildOptions : OpenSettings {
     void addCacheTo(CLI::App& app);
     /// The same, whose notes and progress go to standard error.
     OpenSettings told(bool isQuiet) const;
+    /// --only-points and --grid.
+    void addFormatsTo(CLI::App& app);
+    void addGridTo(CLI::App& app);
 };
 /// To standard error.
 void printLine(const std::string& line);

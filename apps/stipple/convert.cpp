@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/convert_format.h"
 #include "apps/stipple/convert_patches.h"
 #include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
@@ -21,6 +22,7 @@ struct Options {
     std::string input, output;
     bool curves = false, patches = false, json = false, force = false;
     PatchConversion asPatches;
+    FormatConversion asFormat;
     BuildOptions build;  ///< of which reading the input uses some
     scene::CurveFitSettings fit;
 };
@@ -87,17 +89,25 @@ struct Beside {
 
 /// What belongs to the one is of no use to the other.
 Result<void> checkAsked(const Options& o, const CLI::App& sub) {
-    if (o.curves == o.patches)
-        return fail(ErrorKind::usage, o.curves ? "are two things to convert to" : "says nothing of what to convert to",
-                    o.curves ? "--curves and --patches" : "stipple convert",
-                    "give --curves: polygon plants become ribbons and tubes, or --patches: a scan or a mesh becomes "
-                    "elevation patches");
-    const std::vector<const char*> others =
-        o.curves ? std::vector{"--cone", "--fill-gaps", "--overlap", "--patch-samples", "--only-points", "--threads"}
-                 : std::vector{"--tolerance", "--joints"};
-    for (const char* name : others)
-        if (sub.count(name) > 0)
-            return fail(ErrorKind::usage, o.curves ? "belongs to --patches" : "belongs to --curves", name);
+    const bool isFormat = !o.curves && !o.patches && isWritten(o.output);
+    if (o.curves == o.patches && !isFormat)
+        return fail(
+            ErrorKind::usage, o.curves ? "are two things to convert to" : "says nothing of what to convert to",
+            o.curves ? "--curves and --patches" : "stipple convert",
+            fmt::format("give --curves: polygon plants become ribbons and tubes, or --patches: a scan or a mesh "
+                        "becomes elevation patches; or name an output of another format ({})",
+                        writtenEndings()));
+    using Names = std::vector<const char*>;
+    const std::string toOthers = writtenEndings();
+    const auto refuse = [&](const Names& names, const std::string& of) -> Result<void> {
+        for (const char* name : names)
+            if (sub.count(name) > 0) return fail(ErrorKind::usage, "belongs to " + of, name);
+        return {};
+    };
+    if (!o.patches) STIPPLE_TRY(refuse({"--cone", "--fill-gaps", "--overlap", "--patch-samples"}, "--patches"));
+    if (o.curves) STIPPLE_TRY(refuse({"--only-points", "--threads"}, "--patches"));
+    if (!o.curves) STIPPLE_TRY(refuse({"--tolerance", "--joints"}, "--curves"));
+    if (!isFormat) STIPPLE_TRY(refuse({"--voxel"}, "outputs of other formats: " + toOthers));
     return {};
 }
 
@@ -177,13 +187,16 @@ Result<void> run(const Options& o) {
 
 void setupConvert(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
-    CLI::App* sub = app.add_subcommand("convert", "polygon plants to ribbons and tubes, scans and meshes to patches");
+    CLI::App* sub = app.add_subcommand("convert",
+                                       "polygon plants to ribbons and tubes, scans and meshes to patches or "
+                                       "to other formats");
     sub->add_option("INPUT", o->input,
-                    "the plant (.gltf, .glb, .obj); of patches: a scan or a mesh (.ply, .las, .laz too)")
+                    "the plant (.gltf, .glb, .obj); of patches: a scan or a mesh; to other formats: also a built scene")
         ->required();
     sub->add_option("-o,--output", o->output,
                     "the file to write (.stipple: what is neither ribbon nor tube goes to NAME.rest.glb beside it, and "
-                    "NAME.scene.glb shows both; .glb or .gltf: lines with radii)")
+                    "NAME.scene.glb shows both; .glb or .gltf: lines with radii; of other formats: " +
+                        writtenEndings() + ")")
         ->type_name("FILE")
         ->required();
     addForce(*sub, o->force);
@@ -196,6 +209,7 @@ void setupConvert(CLI::App& app, int& status) {
         ->transform(within(2, 1000))
         ->capture_default_str();
     addPatchOptions(*sub, o->patches, o->asPatches);
+    addFormatOptions(*sub, o->asFormat);
     sub->add_option("--memory", o->build.memory, "memory that reading the input may use, bytes: 512M, 4G")
         ->check(bytes())
         ->type_name("SIZE")
@@ -213,6 +227,16 @@ void setupConvert(CLI::App& app, int& status) {
             p.build.memory = o->build.memory;
             p.build.allowOutside = o->build.allowOutside;
             result = convertToPatches(p);
+        } else if (result && !o->curves) {
+            FormatConversion& f = o->asFormat;
+            f.input = o->input;
+            f.output = o->output;
+            f.json = o->json;
+            f.force = o->force;
+            f.build.memory = o->build.memory;
+            f.build.allowOutside = o->build.allowOutside;
+            f.build.onlyPoints = o->asPatches.build.onlyPoints;
+            result = convertToFormat(f);
         } else if (result) {
             result = run(*o);
         }

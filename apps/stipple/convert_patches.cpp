@@ -15,7 +15,7 @@
 #include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/base/words.h"
-#include "engine/scene/open/ply_meshes.h"
+#include "engine/scene/open/mesh_files.h"
 #include "engine/scene/place_looks.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/points/input_colours.h"
@@ -89,10 +89,10 @@ Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& no
                     "textures become colours and normals of samples; --patch-samples N for more of them");
             return out;
         }
-    } else if (const auto faces = lod::plyFaces(o.input); faces && faces->any() && !o.build.onlyPoints) {
-        STIPPLE_ASSIGN(const lod::MeshSource source,
-                       lod::openPlyMesh(o.input, o.build.reading().memoryBytes, fs::temp_directory_path().string()));
-        STIPPLE_ASSIGN(out.mesh, collect(source, o.output));
+    } else if (const auto hasMesh = lod::hasMesh(o.input, o.build.formatOptions()); hasMesh && *hasMesh) {
+        STIPPLE_ASSIGN(const lod::OpenedMesh opened, lod::openMesh(o.input, o.build.formatOptions()));
+        notes.insert(notes.end(), opened.notes.begin(), opened.notes.end());
+        STIPPLE_ASSIGN(out.mesh, collect(opened.source, o.output));
         out.isMesh = true;
         return out;
     }
@@ -330,7 +330,7 @@ void addPatchOptions(CLI::App& app, bool& patches, PatchConversion& o) {
                    "of patches: samples aimed at (default: as many as points or vertices, of a mesh 20,000 at least)")
         ->transform(within<uint64_t>(1, 1'000'000'000))
         ->type_name("N");
-    app.add_flag("--only-points", o.build.onlyPoints, "of patches: the vertices of a PLY file with faces");
+    app.add_flag("--only-points", o.build.onlyPoints, "of what could be triangles take points");
     app.add_option("--threads", o.build.threads, "of patches: threads (0: all cores)")
         ->transform(within(0, 1024))
         ->capture_default_str();

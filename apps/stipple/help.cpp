@@ -149,7 +149,7 @@ void arrangeOptions(CLI::App& command) {
                       "--opacity",      "--transfer"});
     group("Inputs that are not built yet",
           {"--memory", "--temp", "--duplicates", "--threads", "--normals", "--radii", "--up", "--attributes",
-           "--surfels", "--curve-radius", "--only-points", "--skip-bad", "--drop-outliers", "--allow-outside",
+           "--surfels", "--curve-radius", "--only-points", "--grid", "--skip-bad", "--drop-outliers", "--allow-outside",
            "--cache-limit", "--progress"});
 }
 

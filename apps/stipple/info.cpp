@@ -441,7 +441,7 @@ Result<void> run(const Options& o) {
         return fail(ErrorKind::usage, "is not a built scene, in which --at finds points", o.input,
                     "build it first: stipple build INPUT -o SCENE.stipple");
     const auto executor = makeTbbExecutor(0);
-    return showInputInfo({o.input, o.verify, o.json, o.skipBad, o.build.reading()}, *executor);
+    return showInputInfo({o.input, o.verify, o.json, o.skipBad, o.build.reading(), o.build.formatOptions()}, *executor);
 }
 
 }  // namespace
@@ -456,6 +456,7 @@ void setupInfo(CLI::App& app, int& status) {
                     "with --verify, of a scene of patches: measure how far they are from this mesh or scan, both ways")
         ->type_name("SOURCE");
     sub->add_flag("--only-points", o->build.onlyPoints, "with --against: the vertices of a PLY file with faces");
+    o->build.addGridTo(*sub);
     sub->add_option("--at", o->at, "file coordinates: the input point of a built scene that is nearest to them")
         ->type_name("X,Y,Z");
     sub->add_flag("--skip-bad", o->skipBad, "go on past what is corrupt");

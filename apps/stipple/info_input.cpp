@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/info_parts.h"
 #include "engine/base/file.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
@@ -440,6 +441,7 @@ Result<void> showCurves(const InputInfoOptions& o) {
 Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
     if (scene::isSceneFile(o.input)) return showScene(o);
     if (lod::isCurveFile(o.input)) return showCurves(o);
+    if (const lod::Format* const f = lod::formatOf(o.input); f && f->describe) return showParts(o, *f);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs({o.input}));
     if (files.size() != 1) return showFolder(o, files, executor);
     STIPPLE_ASSIGN(const nlohmann::json j, fileInfo(o, files.front(), executor));

@@ -4,6 +4,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
 #include "engine/scene/read_settings.h"
+#include "lod/import/formats.h"
 
 namespace stipple::app {
 
@@ -13,6 +14,7 @@ struct InputInfoOptions {
     bool json = false;
     bool skipBad = false;
     scene::ReadSettings reading;
+    lod::FormatOptions more = {};
 };
 
 Result<void> showInputInfo(const InputInfoOptions& options, Executor& executor);

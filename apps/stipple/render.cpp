@@ -28,7 +28,7 @@
 #include "engine/reference/reference.h"
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
-#include "engine/scene/open/ply_meshes.h"
+#include "engine/scene/open/mesh_files.h"
 #include "engine/scene/open/scene_facts.h"
 #include "lod/store/file_kind.h"
 #include "lod/store/materials.h"
@@ -430,7 +430,7 @@ void addReading(CLI::App& sub, Options& o) {
     sub.add_option("--curve-radius,--strand-radius", o.build.curveRadius,
                    "radius of curves that have none, file units (0: a 4000th of the extent)")
         ->transform(within(0.0, 1e300));
-    sub.add_flag("--only-points", o.build.onlyPoints, "of a PLY mesh take the vertices, as points");
+    o.build.addFormatsTo(sub);
     addSceneFileOptions(sub, o.build.allowOutside, o.build.repair);
     sub.add_flag("--skip-bad", o.build.skipBad, "go on past corrupt chunks and files, and say what was lost");
     sub.add_option("--threads", o.build.threads, "threads (0: all cores)")

@@ -22,7 +22,7 @@
 #include "engine/gpu/gpu_backend.h"
 #include "engine/image/image_io.h"
 #include "engine/render/accumulation.h"
-#include "engine/scene/open/ply_meshes.h"
+#include "engine/scene/open/mesh_files.h"
 #include "engine/scene/open/scene_facts.h"
 
 namespace stipple::app {

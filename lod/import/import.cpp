@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/file.h"
+#include "lod/import/formats.h"
 
 namespace stipple::lod {
 namespace {
@@ -22,11 +23,6 @@ std::string lowerExtension(const fs::path& path) {
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return std::tolower(c); });
     return extension;
-}
-
-bool isPointFile(const fs::path& path) {
-    const std::string extension = lowerExtension(path);
-    return extension == ".las" || extension == ".laz" || extension == ".ply";
 }
 
 /// Formats of points that other programs turn into ours.
@@ -42,10 +38,10 @@ Result<std::vector<std::string>> filesBelow(const fs::path& folder) {
     std::error_code error;
     for (auto it = fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied, error);
          !error && it != fs::recursive_directory_iterator(); it.increment(error))
-        if (it->is_regular_file(error) && isPointFile(it->path())) files.push_back(it->path().string());
+        if (it->is_regular_file(error) && formatNamed(it->path().string())) files.push_back(it->path().string());
     if (error) return fail(ErrorKind::input, "cannot be listed: " + error.message(), folder.string());
     if (files.empty())
-        return fail(ErrorKind::input, "holds no .las, .laz or .ply file", folder.string(),
+        return fail(ErrorKind::input, "holds no " + allEndings(" or ") + " file", folder.string(),
                     "octrees of other formats (e.g. Potree's octree.bin) are not read");
     std::sort(files.begin(), files.end());
     return files;
@@ -152,26 +148,21 @@ Result<uint64_t> readPoints(const PointSource& source, const std::function<Resul
     return points;
 }
 
-Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options) {
+Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options, const FormatOptions& more) {
     std::error_code ignored;
     if (fs::is_directory(path, ignored))
         return fail(ErrorKind::input, "is a directory", path, "name the files in it, e.g. " + path + "/*.las");
-    std::array<char, 4> magic{};
+    std::array<char, 2> head{};
     {
         STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
         if (file.sizeBytes() == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
-        if (file.sizeBytes() >= magic.size()) STIPPLE_TRY(file.readAt(0, magic.data(), magic.size()));
+        if (file.sizeBytes() >= head.size()) STIPPLE_TRY(file.readAt(0, head.data(), head.size()));
     }
-    const std::string head(magic.data(), magic.size());
-    if (head.substr(0, 3) == "ply") return openPly(path, options);
-    if (head == "LASF") return openLas(path, options);
-    const std::string extension = lowerExtension(path);
-    if (extension == ".ply") return openPly(path, options);
-    if (extension == ".las" || extension == ".laz") return openLas(path, options);
-    if (head.substr(0, 2) == "\x1f\x8b")
+    if (const Format* const format = formatOf(path)) return format->openPoints(path, options, more);
+    if (std::string_view(head.data(), head.size()) == "\x1f\x8b")
         return fail(ErrorKind::input, "is compressed with gzip", path, "unpack it first: gunzip -k");
-    const std::string reads = "it reads .las, .laz, .ply, .gltf, .glb, .obj, .swc, .trk, .hair and cylinder models";
-    if (isOtherPointFormat(extension))
+    const std::string reads = "it reads " + allEndings() + ", .gltf, .glb, .obj, .swc, .trk, .hair and cylinder models";
+    if (isOtherPointFormat(lowerExtension(path)))
         return fail(ErrorKind::input, "holds points in a format that this version does not read", path,
                     reads + "; `pdal translate` or CloudCompare make .laz of it");
     return fail(ErrorKind::input, "is in a format that this version does not read", path, reads);

@@ -5,13 +5,15 @@
 #include <string>
 #include <vector>
 
+#include "lod/import/formats.h"
 #include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
 
-/// By content, then by extension: PLY, LAS, LAZ. Errors say which formats there are. The file is closed again:
-/// thousands of sources may be open at once.
-Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options = {});
+/// By content, then by extension, of the formats in the table (formats.h). Errors say which there are. The file is
+/// closed again: thousands of sources may be open at once.
+Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options = {},
+                                    const FormatOptions& more = {});
 
 /// PLY: ascii, binary little and big endian; any property order and type; elements before `vertex` and lists are
 /// skipped.
@@ -23,7 +25,8 @@ Result<PointSource> openLas(const std::string& path, const ReadOptions& options 
 /// Every point of a source in file order, on this thread; `take` is called with each block. Returns their number.
 Result<uint64_t> readPoints(const PointSource& source, const std::function<Result<void>(const PointBlock&)>& take = {});
 
-/// What a person names as input, as files: a file is itself; a folder is every .las, .laz and .ply below it; a pattern
+/// What a person names as input, as files: a file is itself; a folder is every file of a format in the table below it;
+/// a pattern
 /// (*, ?, [) is what it matches; the ept.json or cloud.js of a LAZ octree is its node files, whose points together are
 /// the scan. Sorted by name, so that the order does not depend on the file system. A file that is named twice (by
 /// links, or itself and with its folder) is taken once, which `notes` says.

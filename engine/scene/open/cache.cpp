@@ -27,14 +27,15 @@ namespace {
 /// Of everything that decides what a build gives. A new option does not compile until it is named here: does it change
 /// the bytes?
 std::string settingsText(const OpenSettings& build) {
-    const auto& [memory, normals, radii, up, attributes, temp, duplicates, cacheLimit, threads, skipBad, onlyPoints,
-                 allowOutside, dropOutliers, surfelWeights, curveRadius, surfels, ranks, material, together, leftovers,
-                 isStopped, told, lost, progressStyle, onProgress] = build;
+    const auto& [memory, normals, radii, up, attributes, temp, duplicates, grid, cacheLimit, threads, skipBad,
+                 onlyPoints, allowOutside, dropOutliers, surfelWeights, curveRadius, surfels, ranks, material, together,
+                 leftovers, isStopped, told, lost, progressStyle, onProgress] = build;
     // Not memory, temp, threads, ranks, together, leftovers, and who is told: any give the same. Not attributes: what
     // is cached has all of them.
     const std::string of = material ? fmt::format("|{}", lod::identityOf(*material)) : std::string();
     return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}{}{}", normals, radii, up, duplicates, skipBad, onlyPoints,
-                       allowOutside, dropOutliers, curveRadius, surfels, of, surfelWeights ? "|weights" : "");
+                       allowOutside, dropOutliers, curveRadius, surfels, of, surfelWeights ? "|weights" : "") +
+           (grid.empty() ? "" : "|grid " + grid);
 }
 
 /// Path, size and the times of the last change of content and of place: a copy that keeps its time is another file.

@@ -16,8 +16,8 @@
 #include "engine/scene/gltf/container.h"
 #include "engine/scene/open/builds_of_scene.h"
 #include "engine/scene/open/cache.h"
+#include "engine/scene/open/mesh_files.h"
 #include "engine/scene/open/open_scene.h"
-#include "engine/scene/open/ply_meshes.h"
 #include "engine/scene/open/proxies.h"
 #include "engine/scene/open/scene_facts.h"
 #include "engine/scene/outline.h"
@@ -34,8 +34,8 @@ namespace stipple::scene {
 namespace fs = std::filesystem;
 
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
-                                   const ReadSettings& reading, const Say& say) {
-    if (!isSceneFile(path)) return lod::openPointSource(path, options);
+                                   const ReadSettings& reading, const Say& say, const lod::FormatOptions& more) {
+    if (!isSceneFile(path)) return lod::openPointSource(path, options, more);
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, reading));
     STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, reading.memoryBytes, say));
     return scene::sampleSurfels(scene, images, {surfels});
@@ -323,8 +323,8 @@ Result<void> openSceneFile(const std::string& path, const OpenSettings& options,
     return {};
 }
 
-/// Of PLY files with faces; their paths are made by whoever builds them.
-Result<lod::MeshBuildSettings> plySettings(const OpenSettings& build) {
+/// Of files of triangles; their paths are made by whoever builds them.
+Result<lod::MeshBuildSettings> meshFileSettings(const OpenSettings& build) {
     scene::Scene plain;
     return meshSettings(plain, {}, build);
 }
@@ -362,15 +362,15 @@ Result<void> areSeen(const std::vector<std::string>& inputs) {
     return {};
 }
 
-/// Scans, or PLY files that all have faces.
+/// Scans, or files that all have triangles.
 Result<lod::BuildReport> buildFiles(const std::vector<std::string>& inputs, const std::string& output,
                                     const OpenSettings& build, Executor& executor, Progress& progress) {
-    STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
+    STIPPLE_ASSIGN(const MeshFiles meshes, findMeshFiles(inputs, build));
     if (meshes.areAll()) {
         if (build.material) return noPointsToLight(inputs.front());
-        STIPPLE_ASSIGN(lod::MeshBuildSettings settings, plySettings(build));
+        STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshFileSettings(build));
         STIPPLE_ASSIGN(lod::BuildReport report,
-                       buildPlyMeshes(meshes.files, output, build, std::move(settings), executor, progress));
+                       buildMeshFiles(meshes.files, output, build, std::move(settings), executor, progress));
         report.notes.insert(report.notes.begin(), meshes.notes.begin(), meshes.notes.end());
         return report;
     }
@@ -435,12 +435,12 @@ Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::strin
         return openCached(inputs, build, "curves", [&](const std::string& path, Progress& progress) {
             return buildCurveFile(inputs[0], path, build, executor, progress);
         });
-    STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
+    STIPPLE_ASSIGN(const MeshFiles meshes, findMeshFiles(inputs, build));
     if (meshes.areAll())
         return openCached(inputs, build, "triangles",
                           [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
-                              STIPPLE_ASSIGN(lod::MeshBuildSettings settings, plySettings(build));
-                              return buildPlyMeshes(meshes.files, path, build, std::move(settings), executor, progress);
+                              STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshFileSettings(build));
+                              return buildMeshFiles(meshes.files, path, build, std::move(settings), executor, progress);
                           });
     if (const std::string note = meshes.note(); !note.empty()) say(build, "note: " + note);
     return openBuilt(inputs, build, executor);

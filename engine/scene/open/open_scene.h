@@ -22,7 +22,8 @@ namespace stipple::scene {
 
 /// Scans by the readers of lod; meshes as `surfels` samples (0: only the points that they hold).
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
-                                   const ReadSettings& reading, const Say& say = {});
+                                   const ReadSettings& reading, const Say& say = {},
+                                   const lod::FormatOptions& more = {});
 /// The images of a scene in at most half of `memoryBytes`. One that cannot be decoded counts as white (or flat), and
 /// `say` is told so, once.
 Result<std::vector<DecodedImage>> decodeImages(const Scene& scene, uint64_t memoryBytes, const Say& say = {});

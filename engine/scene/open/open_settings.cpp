@@ -31,6 +31,11 @@ ReadSettings OpenSettings::reading() const {
     return reading;
 }
 
+lod::FormatOptions OpenSettings::formatOptions() const {
+    const uint64_t bytes = reading().memoryBytes;
+    return {.part = grid, .onlyPoints = onlyPoints, .tempFolder = temp, .memoryBytes = bytes, .openingBytes = bytes};
+}
+
 Result<lod::BuildSettings> OpenSettings::settings() const {
     lod::BuildSettings s;
     s.material = material;
@@ -50,8 +55,9 @@ Result<lod::BuildSettings> OpenSettings::settings() const {
     s.leftovers = leftovers;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
-    s.open = [count = surfels, how = reading(), told = loss](const std::string& path, const lod::ReadOptions& o) {
-        return openInput(path, o, count, how, told);
+    s.open = [count = surfels, how = reading(), told = loss, more = formatOptions()](const std::string& path,
+                                                                                     const lod::ReadOptions& o) {
+        return openInput(path, o, count, how, told, more);
     };
     s.allAttributes = attributes == "all";
     s.attributes = namesOf(attributes);

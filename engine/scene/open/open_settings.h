@@ -11,6 +11,7 @@
 #include "engine/base/result.h"
 #include "engine/scene/read_settings.h"
 #include "lod/builder/build.h"
+#include "lod/import/formats.h"
 
 namespace stipple::scene {
 
@@ -22,6 +23,7 @@ using Say = std::function<void(const std::string& line)>;
 /// Sizes are bytes ("512M", "2G"); words are those of `stipple build`, which says what they mean.
 struct OpenSettings {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none", temp, duplicates = "keep";
+    std::string grid;        ///< of files that hold several: the one that is wanted; empty: all
     std::string cacheLimit;  ///< of the cache of built scenes; empty: its default
     int threads = 0;
     bool skipBad = false, onlyPoints = false, allowOutside = false, dropOutliers = false;
@@ -41,6 +43,8 @@ struct OpenSettings {
     Result<lod::BuildSettings> settings() const;
     /// How scene files are read.
     ReadSettings reading() const;
+    /// How files of the formats in the table are.
+    lod::FormatOptions formatOptions() const;
 };
 
 /// What all builds of one scene tell.

@@ -1,4 +1,4 @@
-// PLY files with faces: triangles, unless only their points are wanted.
+// Files of triangles (PLY with faces, and what else the table of formats has), unless only points are wanted of them.
 #pragma once
 
 #include <string>
@@ -6,12 +6,13 @@
 
 #include "engine/scene/open/open_scene.h"
 #include "lod/builder/mesh/mesh_build.h"
+#include "lod/import/formats.h"
 
 namespace stipple::scene {
 
 /// What some inputs hold, as files.
-struct PlyMeshes {
-    std::vector<std::string> files;  ///< with faces, of which not only the vertices are wanted
+struct MeshFiles {
+    std::vector<std::string> files;  ///< with triangles, of which not only points are wanted
     size_t others = 0;               ///< files without
     std::vector<std::string> notes;  ///< on what was named twice
     /// Are they built as triangles?
@@ -23,11 +24,14 @@ struct PlyMeshes {
 tl::unexpected<Error> nothingToSample(const std::string& input);
 /// What --material is told where there are no points.
 tl::unexpected<Error> noPointsToLight(const std::string& input);
-Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const OpenSettings& build);
+Result<MeshFiles> findMeshFiles(const std::vector<std::string>& inputs, const OpenSettings& build);
 
 /// The triangles of all `files` in one store. `settings`: without limits and source.
-Result<lod::BuildReport> buildPlyMeshes(const std::vector<std::string>& files, const std::string& output,
+Result<lod::BuildReport> buildMeshFiles(const std::vector<std::string>& files, const std::string& output,
                                         const OpenSettings& build, lod::MeshBuildSettings settings, Executor& executor,
                                         Progress& progress);
+
+/// The triangles of several files as one, with what there is to say of each.
+Result<lod::OpenedMesh> openMeshes(const std::vector<std::string>& files, const lod::FormatOptions& more);
 
 }  // namespace stipple::scene
