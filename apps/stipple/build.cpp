@@ -108,10 +108,10 @@ Result<void> run(const Options& o, bool& isSilent) {
 
 void setupBuild(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
-    CLI::App* sub = app.add_subcommand(
-        "build",
-        "build the hierarchy of scans (.ply, .las, .laz), of a mesh (.ply with faces, .gltf, .glb, .obj) or of "
-        "curves (.swc, .trk, .hair, cylinder models)");
+    CLI::App* sub = app.add_subcommand("build",
+                                       "build the hierarchy of scans (.ply, .las, .laz, .vdb), of a mesh (.ply with "
+                                       "faces, .vdb, .gltf, .glb, .obj) or of "
+                                       "curves (.swc, .trk, .hair, cylinder models)");
     sub->add_option("INPUT", o->inputs,
                     "scans that together make the scene: files, folders, patterns, ept.json, cloud.js")
         ->required();

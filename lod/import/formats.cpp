@@ -8,6 +8,7 @@
 #include "engine/base/file.h"
 #include "lod/import/import.h"
 #include "lod/import/ply/mesh.h"
+#include "lod/import/vdb/vdb.h"
 
 namespace stipple::lod {
 namespace {
@@ -40,6 +41,15 @@ const std::vector<Format>& table() {
          .openPoints = plyPoints,
          .hasMesh = plyHasMesh,
          .openMesh = plyMesh},
+        {.name = "OpenVDB",
+         .endings = {".vdb"},
+         .marks = {std::string_view(" BDV\0\0\0\0", 8)},
+         .openPoints = openVdbPoints,
+         .hasMesh = vdbHasMesh,
+         .openMesh = openVdbMesh,
+         .describe = describeVdb,
+         .writePoints = writeVdbPoints,
+         .writeMesh = writeVdbMesh},
     };
     return kFormats;
 }

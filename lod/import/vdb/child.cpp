@@ -1,0 +1,114 @@
+#include "lod/import/vdb/child.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <vector>
+
+#include "engine/base/process.h"
+
+namespace stipple::lod {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr int kColumns = 3;  ///< the descriptor that the program has the columns under
+
+/// Beside the program (build tree), in lib/stipple of an installation, or where the build put it (tests).
+Result<std::string> programPath() {
+    std::error_code ignored;
+    const fs::path folder = fs::read_symlink("/proc/self/exe", ignored).parent_path();
+    for (const fs::path& place : {folder / "stipple_vdb", folder / STIPPLE_INSTALLED_VDB, fs::path(STIPPLE_BUILT_VDB)})
+        if (fs::is_regular_file(place, ignored)) return place.string();
+    return fail(ErrorKind::input, "the program that reads OpenVDB files is not there",
+                (folder / "stipple_vdb").string(), "install stipple anew, with the packages that it names");
+}
+
+/// All that it says, until it closes its end; killed where a stop is asked for.
+std::string listen(int from, pid_t child) {
+    constexpr int kTurnMs = 100;
+    std::string said;
+    for (;;) {
+        if (isStopRequested()) ::kill(child, SIGKILL);
+        pollfd wait{from, POLLIN, 0};
+        const int ready = ::poll(&wait, 1, kTurnMs);
+        if (ready < 0 && errno != EINTR) return said;
+        if (ready <= 0) continue;
+        std::array<char, 4096> block{};
+        const ssize_t got = ::read(from, block.data(), block.size());
+        if (got < 0 && errno == EINTR) continue;
+        if (got <= 0) return said;
+        said.append(block.data(), static_cast<size_t>(got));
+    }
+}
+
+Result<nlohmann::json> answerOf(const std::string& said, int status, const std::string& where) {
+    if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted", where);
+    if (WIFSIGNALED(status))
+        return fail(ErrorKind::input, fmt::format("made its reader end ({})", ::strsignal(WTERMSIG(status))), where,
+                    "the file is damaged");
+    nlohmann::json answer = nlohmann::json::parse(said, nullptr, false);
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || !answer.is_object())
+        return fail(ErrorKind::input, "made its reader end without an answer", where, "the file is damaged");
+    if (!answer.contains("error")) return answer;
+    const auto& e = answer["error"];
+    return fail(static_cast<ErrorKind>(e.value("kind", 3)), e.value("what", ""), e.value("where", where),
+                e.value("hint", ""));
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const NamelessFile>> NamelessFile::create(const std::string& folder) {
+    std::error_code error;
+    const fs::path place = folder.empty() ? fs::temp_directory_path(error) : fs::path(folder);
+    std::string name = (place / "stipple-vdb-XXXXXX").string();
+    const int descriptor = ::mkostemp(name.data(), O_CLOEXEC);
+    if (descriptor < 0)
+        return fail(ErrorKind::output, fmt::format("no temporary file can be made: {}", std::strerror(errno)),
+                    place.string(), "--temp names another folder");
+    ::unlink(name.c_str());
+    return std::make_shared<const NamelessFile>(descriptor);
+}
+
+NamelessFile::~NamelessFile() { ::close(descriptor_); }
+
+Result<nlohmann::json> runVdbProgram(nlohmann::json request, const NamelessFile& columns, const std::string& where) {
+    STIPPLE_ASSIGN(std::string program, programPath());
+    request["columns"] = fmt::format("/proc/self/fd/{}", kColumns);
+    std::string text = request.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    std::array<int, 2> ends{};
+    if (::pipe2(ends.data(), O_CLOEXEC) != 0)
+        return fail(ErrorKind::input, fmt::format("its reader cannot be started: {}", std::strerror(errno)), where);
+    posix_spawn_file_actions_t actions{};
+    ::posix_spawn_file_actions_init(&actions);
+    ::posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    ::posix_spawn_file_actions_adddup2(&actions, ends[1], 1);
+    ::posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", O_WRONLY, 0);
+    ::posix_spawn_file_actions_adddup2(&actions, columns.descriptor(), kColumns);
+    std::array<char*, 3> arguments{program.data(), text.data(), nullptr};
+    pid_t child = 0;
+    const int failed = ::posix_spawn(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
+    ::posix_spawn_file_actions_destroy(&actions);
+    ::close(ends[1]);
+    if (failed != 0) {
+        ::close(ends[0]);
+        return fail(ErrorKind::input, fmt::format("its reader cannot be started: {}", std::strerror(failed)), where);
+    }
+    const std::string said = listen(ends[0], child);
+    ::close(ends[0]);
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    return answerOf(said, status, where);
+}
+
+}  // namespace stipple::lod
