@@ -16,6 +16,7 @@
 #include <new>
 
 #include "engine/base/file.h"
+#include "engine/base/own_places.h"
 #include "engine/base/process.h"
 #include "engine/image/oiio_module.h"
 #include "engine/image/png_check.h"
@@ -31,23 +32,8 @@ struct Module {
     std::string problem;
 };
 
-/// Of the program, or of libstipple.so in somebody else's.
-std::filesystem::path folderOfThisCode() {
-    Dl_info info{};
-    std::error_code ignored;
-    if (::dladdr(reinterpret_cast<const void*>(&folderOfThisCode), &info) == 0 || info.dli_fname == nullptr) return {};
-    return std::filesystem::canonical(info.dli_fname, ignored).parent_path();
-}
-
-/// Beside the program (build tree), in lib/stipple of an installation, beside the library, or where the build put it
-/// (tests).
-std::array<std::string, 5> modulePlaces() {
-    std::error_code ignored;
-    const auto folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
-    const auto library = folderOfThisCode();
-    return {(folder / "libstipple_oiio.so").string(), (folder / STIPPLE_INSTALLED_MODULE).string(),
-            (library / "stipple" / "libstipple_oiio.so").string(), (library / "libstipple_oiio.so").string(),
-            STIPPLE_BUILT_MODULE};
+std::vector<std::string> modulePlaces() {
+    return ownPlaces("libstipple_oiio.so", STIPPLE_INSTALLED_MODULE, STIPPLE_BUILT_MODULE);
 }
 
 /// Under a limit of address space: some of the module's 261 libraries end the program where they find none for their
@@ -96,7 +82,7 @@ Result<void> checkModule(bool load) {
         return fail(ErrorKind::output, "the picture module cannot be loaded: " + why, "",
                     "install the program anew, with the packages that it names");
     };
-    const std::array<std::string, 5> places = modulePlaces();
+    const std::vector<std::string> places = modulePlaces();
     std::error_code ignored;
     if (std::none_of(places.begin(), places.end(), [&](const auto& p) { return std::filesystem::exists(p, ignored); }))
         return missing(places[0] + " is not there");

@@ -15,6 +15,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "engine/base/own_places.h"
 #include "engine/base/process.h"
 
 namespace stipple::lod {
@@ -23,14 +24,13 @@ namespace fs = std::filesystem;
 
 constexpr int kColumns = 3;  ///< the descriptor that the program has the columns under
 
-/// Beside the program (build tree), in lib/stipple of an installation, or where the build put it (tests).
 Result<std::string> programPath() {
     std::error_code ignored;
-    const fs::path folder = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-    for (const fs::path& place : {folder / "stipple_vdb", folder / STIPPLE_INSTALLED_VDB, fs::path(STIPPLE_BUILT_VDB)})
-        if (fs::is_regular_file(place, ignored)) return place.string();
-    return fail(ErrorKind::input, "the program that reads OpenVDB files is not there",
-                (folder / "stipple_vdb").string(), "install stipple anew, with the packages that it names");
+    const std::vector<std::string> places = ownPlaces("stipple_vdb", STIPPLE_INSTALLED_VDB, STIPPLE_BUILT_VDB);
+    for (const std::string& place : places)
+        if (fs::is_regular_file(place, ignored)) return place;
+    return fail(ErrorKind::input, "the program that reads OpenVDB files is not there", places.front(),
+                "install stipple anew, with the packages that it names");
 }
 
 /// All that it says, until it closes its end; killed where a stop is asked for.
