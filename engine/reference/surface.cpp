@@ -208,9 +208,10 @@ bool surfaceOn(const dvec3& ray, const dvec2& weights, double footprint, const C
         s.occlusion = 1 + m.occlusionStrength * (texel.x - 1);
     if (textures.sample(m.emissiveTexture, uv, footprint, texel)) s.emissive *= dvec3(texel);
     n = (surface & shared::kSurfaceFlat) != 0 ? face : wa * c[0].normal + wb * c[1].normal + wc * c[2].normal;
+    const bool isFolded = glm::dot(face, n) < 0;
     if (textures.sample(m.normalTexture, uv, footprint, texel)) n = bump(n, c, dvec3(texel), m.normalScale);
     if (textures.show != nullptr) (*textures.show)(uv, footprint, s, n);
-    if (glm::dot(face, ray) > 0) n = -n;
+    if ((glm::dot(face, ray) > 0) != isFolded) n = -n;
     const dvec3 v = glm::normalize(ray);
     n -= std::max(0.0, glm::dot(n, v)) * v;
     n = glm::length(n) > 0 ? glm::normalize(n) : -v;

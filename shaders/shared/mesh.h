@@ -198,6 +198,14 @@ SHARED_FN vec3 bumpedNormal(vec3 anyNormal, vec3 e1, vec3 e2, vec2 d1, vec2 d2, 
     return vec3(t.x * it + b.x * ib + n.x * in_, t.y * it + b.y * ib + n.y * in_, t.z * it + b.z * ib + n.z * in_);
 }
 
+// The triangle's own normal on the side of `n`, the interpolated one; any lengths. What simplification folded over in a
+// flat surface, and what is too thin to have a direction, is no back of it.
+SHARED_FN vec3 faceBeside(vec3 face, vec3 anyNormal) {
+    const vec3 f = aboutOne(face), n = aboutOne(anyNormal);
+    const float side = f.x * n.x + f.y * n.y + f.z * n.z < 0.0f ? -1.0f : 1.0f;
+    return vec3(side * face.x, side * face.y, side * face.z);
+}
+
 // Unit normal to shade with, turned towards the eye. `n`: interpolated, `face`: the triangle's own, any lengths; `ray`:
 // from the eye. Interpolated normals that just turn away at a silhouette are bent back to it instead of flipped.
 SHARED_FN vec3 surfaceNormal(vec3 anyNormal, vec3 anyFace, vec3 ray) {

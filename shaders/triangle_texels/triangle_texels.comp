@@ -36,8 +36,9 @@ void main() {
     vec3 normal = m.normalX * n.x + m.normalY * n.y + m.normalZ * n.z;
     const vec3 e1 = p1 - p0;
     const vec3 e2 = p2 - p0;
-    const vec3 face = cross(e1, e2);
+    vec3 face = cross(e1, e2);
     if ((va.surface & kSurfaceFlat) != 0u) normal = face;
+    face = faceBeside(face, normal);
     const SurfaceMaterial material = materials[m.firstMaterial + (va.surface & kSurfaceMaterialMask)];
     vec3 colour = material.baseColour;
     vec3 emissive = material.emissive;

@@ -341,10 +341,11 @@ TEST(KernelFormulas, TexelsOfTrianglesAreThoseOfTheFormulas) {
                     const vec3 part(linear(0), linear(8), linear(16));
                     colour = v == 0 ? part : plus(colour, part);
                 }
-                const vec3 face(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
+                vec3 face(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
                 const bool isFlat = (c.vertices[at[0]].surface & kSurfaceFlat) != 0u;
                 const DrawMesh& m = c.mesh;
                 const vec3 world = plus(plus(scaled(m.normalX, n.x), scaled(m.normalY, n.y)), scaled(m.normalZ, n.z));
+                if (!isFlat) face = faceBeside(face, world);
                 const vec3 normal = surfaceNormal(isFlat ? face : world, face, rayDirection(ray));
                 const vec3 d = rayDirection(ray);
                 const float inverseRay = 1.0f / std::sqrt(d.x * d.x + d.y * d.y + 1.0f);

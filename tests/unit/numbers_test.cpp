@@ -140,5 +140,30 @@ TEST(Numbers, TheShadedNormalOfATriangleHangsOnItsShapeAlone) {
     }
 }
 
+TEST(Numbers, TrianglesFoldedOverInAFlatSurfaceAreShadedAsItIs) {
+    // Seen from the side of the surface's normal: neither is a triangle whose corners run the other way round its back,
+    // nor one that is so thin that its own normal is what rounding left. From behind it is turned, as all of it.
+    Rng rng(8);
+    for (int i = 0; i < 2000; ++i) {
+        const auto random = [&] { return glm::dvec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)); };
+        const glm::dvec3 ray(rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), 1);
+        glm::dvec3 outward = glm::normalize(random());
+        if (std::abs(glm::dot(outward, glm::normalize(ray))) < 0.05) continue;
+        const glm::vec3 n(outward), r(ray), noise(random());
+        const glm::dvec3 seen = glm::dot(outward, ray) > 0 ? -outward : outward;
+        for (const glm::vec3& face : {n * 1e-12f, n * -1e-12f, n * -3.0f}) {
+            const glm::vec3 shaded(shared::surfaceNormal(n, shared::faceBeside(face, n), r));
+            ASSERT_LT(angleBetween(glm::dvec3(shaded), seen), 0.001);
+        }
+        if (glm::dot(outward, ray) < -0.999 * glm::length(ray)) {
+            const glm::vec3 thin(shared::surfaceNormal(n, shared::faceBeside(noise, n), r));
+            ASSERT_LT(angleBetween(glm::dvec3(thin), seen), 0.1);
+        }
+        // The control: without, what is folded is bent to its outline.
+        const glm::vec3 naive(shared::surfaceNormal(n, n * (glm::dot(outward, ray) < 0 ? -1.0f : 1.0f), r));
+        if (glm::dot(outward, ray) < 0) ASSERT_GT(angleBetween(glm::dvec3(naive), seen), 0.04);
+    }
+}
+
 }  // namespace
 }  // namespace stipple

@@ -59,7 +59,9 @@ dmat4 scaled(const dvec3& size, const dvec3& translation) {
 
 lod::TriangleMesh collect(const lod::MeshSource& source) {
     lod::TriangleMesh all;
-    if (source.survey) EXPECT_TRUE(source.survey([](uint64_t, uint64_t) { return Result<void>(); }));
+    if (source.survey) {
+        EXPECT_TRUE(source.survey([](uint64_t, uint64_t) { return Result<void>(); }));
+    }
     const auto read = source.read([&](const lod::TriangleMesh& block) -> Result<void> {
         lod::append(all, block);
         return {};
@@ -178,9 +180,11 @@ TEST(Vdb, AnUnevenTransformFarFromTheOriginKeepsItsPlaces) {
         EXPECT_LT(said["in voxels"], said["deviation"] / 0.04 * 1.01);
         ASSERT_GT(mesh.indices.size(), 0u);
         EXPECT_GT(volume(mesh, utm), 0);
-        // The control: coordinates in fp32.
+        // The control: coordinates in fp32. (By way of memory: GCC 12 takes a vector's double to float to double for
+        // nothing, and rounds z alone.)
+        const std::vector<glm::vec3> rounded(mesh.position.begin(), mesh.position.end());
         lod::TriangleMesh coarse = mesh;
-        for (dvec3& p : coarse.position) p = dvec3(glm::vec3(p));
+        coarse.position.assign(rounded.begin(), rounded.end());
         EXPECT_GT(farthest(coarse, shape), said["deviation"] + ofField(0.08, shape));
     }
 }
@@ -358,9 +362,8 @@ TEST(Vdb, TrianglesGoOutAndComeBack) {
     }
     EXPECT_EQ(said["lost places"], 0);
     EXPECT_EQ(said["open edges"], 0);
-    // Edges of up to 2 sqrt(3) 0.05 meet at angles a of that times k, 0.43, and a field between voxels rounds a ridge
-    // by tan(a/2)/2 of one, 0.11; twice that, as places are sought along the gradient.
-    EXPECT_LE(said["in voxels"], 0.25);
+    // A field between voxels cannot follow what turns within one.
+    EXPECT_LE(said["in voxels"], 0.5);
     EXPECT_GT(said["in voxels"], 0);
     const lod::TriangleMesh before = collect(mesh->source), after = trianglesOf(folder / "again.vdb");
     auto second = statedOf(folder / "again.vdb");

@@ -49,10 +49,6 @@ nlohmann::json describe(const LevelSet& set, const Surface& surface, const Devia
             {"deviation", deviationJson(deviation)}};
 }
 
-}  // namespace
-
-namespace {
-
 /// Beside an edge sharper than that the gradient is between the sides: smooth across, it would smear light over the
 /// whole of larger triangles that come of these. There corners have the normals of their own triangles.
 constexpr double kSmoothCosine = 0.9;
@@ -70,13 +66,26 @@ uint64_t putVertices(PlyFile& ply, const LevelSet& set, const Surface& surface, 
         putPlace(ply, world.back());
         putDirection(ply, normal.back());
     }
+    // Slivers have a direction by rounding alone: at their corners that of the largest triangle stands for them.
+    constexpr double kSliver = 0.05;  // of a triangle of equal sides
+    std::vector<Vec3d> ofLargest(world.size(), Vec3d(0));
+    const auto twiceArea = [&](const Vec3I& t) {
+        return (world[t[1]] - world[t[0]]).cross(world[t[2]] - world[t[0]]);
+    };
+    for (const Vec3I& t : surface.triangles)
+        for (int k = 0; k < 3; ++k)
+            if (twiceArea(t).length() > ofLargest[t[k]].length()) ofLargest[t[k]] = twiceArea(t) * (mirror ? -1.0 : 1.0);
     uint64_t count = world.size();
     for (Vec3I t : surface.triangles) {
         if (mirror) std::swap(t[1], t[2]);
-        Vec3d own = (world[t[1]] - world[t[0]]).cross(world[t[2]] - world[t[0]]);
-        own = own.length() > 0 ? own / own.length() : Vec3d(0);
+        double longest = 0;
+        for (int k = 0; k < 3; ++k) longest = std::max(longest, (world[t[k]] - world[t[(k + 1) % 3]]).lengthSqr());
+        const Vec3d area = twiceArea(t);
+        const bool isSliver = area.length() < kSliver * std::sqrt(0.75) * longest;
         for (int k = 0; k < 3; ++k) {
             const uint32_t v = t[k];
+            Vec3d own = isSliver ? ofLargest[v] : area;
+            own = own.length() > 0 ? own / own.length() : Vec3d(0);
             t[k] = static_cast<uint32_t>(first + v);
             if (own.length() == 0 || own.dot(normal[v]) >= kSmoothCosine) continue;
             putPlace(ply, world[v]);

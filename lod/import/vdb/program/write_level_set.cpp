@@ -72,6 +72,58 @@ uint64_t openEdges(const Triangles& mesh) {
     return open;
 }
 
+/// Which triangle is nearest, among those that are the nearest of a voxel around a place, and small ones around it.
+class NearTriangles {
+  public:
+    NearTriangles(const Triangles& mesh, const openvdb::Int32Grid& closest)
+        : mesh_(mesh), closest_(closest.getConstAccessor()) {
+        constexpr double kSmall = 2;  // voxels: of larger ones several voxels are nearest
+        for (uint32_t t = 0; t < mesh.corners.size(); ++t) {
+            Vec3d least = mesh.at(t, 0), most = least;
+            for (int k = 1; k < 3; ++k) {
+                least = openvdb::math::minComponent(least, mesh.at(t, k));
+                most = openvdb::math::maxComponent(most, mesh.at(t, k));
+            }
+            if ((most - least).length() < kSmall) small_.emplace_back(cell(Coord::round((least + most) * 0.5)), t);
+        }
+        std::sort(small_.begin(), small_.end());
+    }
+    /// Voxels; 1e300 where none is near.
+    double distance(const Vec3d& p) const {
+        const Coord middle = Coord::round(p);
+        double least = 1e300;
+        for (int x = -1; x <= 1; ++x)
+            for (int y = -1; y <= 1; ++y)
+                for (int z = -1; z <= 1; ++z) {
+                    const Coord at = middle + Coord(x, y, z);
+                    const auto t = static_cast<uint32_t>(closest_.getValue(at));
+                    if (t < mesh_.corners.size()) least = std::min(least, distance(p, t));
+                    const uint64_t of = cell(at);
+                    for (auto s = std::lower_bound(small_.begin(), small_.end(), std::pair{of, 0u});
+                         s != small_.end() && s->first == of; ++s)
+                        least = std::min(least, distance(p, s->second));
+                }
+        return least;
+    }
+
+  private:
+    static uint64_t cell(const Coord& c) {
+        constexpr uint64_t kMask = (1u << 21) - 1;
+        return (uint64_t(uint32_t(c[0])) & kMask) << 42 | (uint64_t(uint32_t(c[1])) & kMask) << 21 |
+               (uint64_t(uint32_t(c[2])) & kMask);
+    }
+    double distance(const Vec3d& p, uint32_t t) const {
+        Vec3d barycentric;
+        return (openvdb::math::closestPointOnTriangleToPoint(mesh_.at(t, 0), mesh_.at(t, 1), mesh_.at(t, 2), p,
+                                                             barycentric) -
+                p)
+            .length();
+    }
+    const Triangles& mesh_;
+    openvdb::Int32Grid::ConstAccessor closest_;
+    std::vector<std::pair<uint64_t, uint32_t>> small_;  ///< cell, triangle
+};
+
 /// How far the triangles lie from the zero crossing, at places a voxel apart, and it from them.
 Deviation deviationFrom(const LevelSet& set, const Triangles& mesh, const openvdb::Int32Grid& closest) {
     constexpr int kMost = 64;
@@ -91,7 +143,7 @@ Deviation deviationFrom(const LevelSet& set, const Triangles& mesh, const openvd
                     ++out.unmeasured;
             }
     }
-    const auto polygon = closest.getConstAccessor();
+    const NearTriangles near(mesh, closest);
     const auto value = set.grid->getConstAccessor();
     for (auto voxel = set.grid->cbeginValueOn(); voxel; ++voxel)
         for (int a = 0; a < 3; ++a) {
@@ -102,15 +154,7 @@ Deviation deviationFrom(const LevelSet& set, const Triangles& mesh, const openvd
             if ((here < 0) == (there < 0) || !value.isValueOn(next)) continue;
             Vec3d p = at.asVec3d();
             p[a] += here / (here - there);
-            double least = 1e300;
-            for (const Coord& c : {at, next}) {
-                const auto t = static_cast<size_t>(polygon.getValue(c));
-                if (t >= mesh.corners.size()) continue;
-                Vec3d barycentric;
-                const Vec3d q = openvdb::math::closestPointOnTriangleToPoint(mesh.at(t, 0), mesh.at(t, 1),
-                                                                             mesh.at(t, 2), p, barycentric);
-                least = std::min(least, (q - p).length());
-            }
+            const double least = near.distance(p);
             if (least < 1e300)
                 out.add(least * unit, least);
             else
@@ -119,9 +163,10 @@ Deviation deviationFrom(const LevelSet& set, const Triangles& mesh, const openvd
     return out;
 }
 
-bool hasInside(const openvdb::FloatGrid& grid) {
+/// Deeper than `depth`?
+bool hasInside(const openvdb::FloatGrid& grid, double depth) {
     for (auto v = grid.cbeginValueAll(); v; ++v)
-        if (*v < 0) return true;
+        if (*v < -depth) return true;
     return false;
 }
 
@@ -142,7 +187,7 @@ Result<nlohmann::json> trianglesToLevelSet(const Request& request, const nlohman
     // and nearest triangles.
     constexpr double kLeaves = 2.5, kBytesOfLeaf = 512 * 8 * 1.5;
     const auto bytes =
-        static_cast<uint64_t>(std::min(area / 64 * kLeaves * kBytesOfLeaf, 1e18)) + mesh.corners.size() * 48;
+        static_cast<uint64_t>(std::min(area / 64 * kLeaves * kBytesOfLeaf, 1e18)) + mesh.corners.size() * 64;
     if (bytes > request.memoryBytes) {
         Error error = overBudget(request, "level sets of so small voxels", bytes).value();
         error.hint += ", or a larger --voxel";
@@ -158,7 +203,8 @@ Result<nlohmann::json> trianglesToLevelSet(const Request& request, const nlohman
     const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(never, adapter, *transform, kBandVoxels,
                                                                        kBandVoxels, 0, &closest);
     const uint64_t open = openEdges(mesh);
-    if (!hasInside(*grid))
+    // Voxels that open sheets run through are counted as inside, too, but are not as deep as half a diagonal.
+    if (!hasInside(*grid, open > 0 ? std::sqrt(0.75) * unit : 0))
         return fail(ErrorKind::input,
                     "encloses nothing that is as wide as a voxel, and level sets are of what is closed (" +
                         std::to_string(open) + " edges are open)",
