@@ -130,9 +130,9 @@ struct Box {
 Box meshBounds(const Scene& scene);
 
 /// glTF 2.0 (.gltf, .glb) with KHR_lights_punctual, KHR_texture_transform, EXT_mesh_gpu_instancing,
-/// KHR_mesh_quantization, EXT_meshopt_compression, KHR_materials_unlit, _transmission, _ior, _volume and _specular (but
-/// for their textures), and STIPPLE_store (README). What cannot be
-/// drawn is refused with the place; other faults of the file, and images that are missing, are counted in the notes.
+/// KHR_draco_mesh_compression, KHR_mesh_quantization, EXT_meshopt_compression, KHR_materials_unlit, _transmission,
+/// _ior, _volume and _specular (but for their textures), and STIPPLE_store (README). What cannot be drawn is refused
+/// with the place; other faults of the file, and images that are missing, are counted in the notes.
 Result<Scene> readGltf(const std::string& path, const ReadSettings& settings = {});
 
 /// Writes .glb or .gltf (buffers inside). Shear of instances is lost, and what meshes have beyond floats goes to nodes

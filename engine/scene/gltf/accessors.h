@@ -28,15 +28,16 @@ class Buffers {
     /// Counts what will be kept of the file against the memory that reading it may take: before it is taken. `what`
     /// is a sentence's subject.
     Result<void> claim(uint64_t bytes, const std::string& what);
+    /// Is there room for so much besides what was claimed?
+    Result<void> fits(uint64_t bytes, const std::string& what) const;
+    /// The bytes of a buffer that was added behind those of the file.
+    void add(std::vector<uint8_t> bytes) { buffers_.push_back(std::move(bytes)); }
     /// The bytes of an image (still encoded).
     Result<std::vector<uint8_t>> image(size_t index);
 
   private:
     Result<void> decompress(size_t index);
     Result<void> addSparse(const nlohmann::json& accessor, size_t components, std::vector<double>& values);
-
-    /// Is there room for so much besides what was claimed?
-    Result<void> fits(uint64_t bytes, const std::string& what) const;
 
     const Container& container_;
     ReadSettings settings_;

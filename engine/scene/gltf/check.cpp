@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/scene/gltf/draco.h"
 #include "engine/scene/gltf/json_tools.h"
 #include "engine/scene/gltf/semantics.h"
 
@@ -9,7 +10,7 @@ namespace stipple::scene::gltf {
 
 using nlohmann::json;
 
-Result<Problems> checkAll(const Container& c, Buffers& buffers) {
+Result<Problems> checkAll(Container& c, Buffers& buffers) {
     Problems p;
     Mends mends;
     checkStructure(c.json, p, mends);
@@ -22,6 +23,7 @@ Result<Problems> checkAll(const Container& c, Buffers& buffers) {
     checkMaterialsAndExtensions(c.json, p);
     if (mattersAny(p)) return p;
     STIPPLE_TRY(buffers.load());
+    STIPPLE_TRY(unpackDraco(c, buffers, p));
     STIPPLE_TRY(checkValues(c, buffers, p));
     STIPPLE_TRY(checkImageBytes(c, buffers, p));
     return p;
@@ -42,30 +44,10 @@ Result<void> checkRequired(const Container& c, bool isStrict, std::vector<std::s
             passedOver.push_back("/extensionsRequired: requires " + text + ", which is not drawn");
             continue;
         }
-        const bool isDraco = text == "KHR_draco_mesh_compression", isMeshopt = text == "KHR_meshopt_compression";
-        return fail(ErrorKind::input, fmt::format("requires the extension {}, which is not supported", text), c.path,
-                    isDraco     ? "decompress it, e.g. with gltf-transform copy or Blender"
-                    : isMeshopt ? "EXT_meshopt_compression is: save it so, or not compressed"
-                                : "");
+        return fail(
+            ErrorKind::input, fmt::format("requires the extension {}, which is not supported", text), c.path,
+            text == "KHR_meshopt_compression" ? "EXT_meshopt_compression is: save it so, or not compressed" : "");
     }
-    return {};
-}
-
-/// Draco may be an alternative to plain accessors; where those are empty, it is the only form.
-Result<void> checkDraco(const Container& c) {
-    for (const json& mesh : arrayOf(c.json, "meshes"))
-        for (const json& primitive : mesh["primitives"]) {
-            if (extensionOf(primitive, "KHR_draco_mesh_compression").is_null()) continue;
-            const auto isEmpty = [&](const json& index) {
-                return !c.json["accessors"][index.get<size_t>()].contains("bufferView");
-            };
-            const json& attributes = primitive["attributes"];
-            if ((attributes.contains("POSITION") && isEmpty(attributes["POSITION"])) ||
-                (primitive.contains("indices") && isEmpty(primitive["indices"])))
-                return fail(ErrorKind::input,
-                            "its meshes are compressed with KHR_draco_mesh_compression, which is not supported", c.path,
-                            "decompress it, e.g. with gltf-transform copy or Blender");
-        }
     return {};
 }
 
@@ -100,10 +82,7 @@ Result<std::vector<std::string>> requireGood(Container& c, Buffers& buffers, boo
         return fail(ErrorKind::input, c.oddities.front(), c.path, "the file is not valid glTF 2.0, but can be drawn");
     std::vector<std::string> passedOver = c.oddities;
     STIPPLE_TRY(checkRequired(c, isStrict, passedOver));
-    if (!isStrict) {
-        STIPPLE_TRY(mendStructure(c, passedOver));
-        STIPPLE_TRY(checkDraco(c));
-    }
+    if (!isStrict) STIPPLE_TRY(mendStructure(c, passedOver));
     STIPPLE_ASSIGN(const Problems problems, checkAll(c, buffers));
     if (mattersAny(problems) || (isStrict && !problems.empty()))
         return tl::unexpected(refuse(c, problems, isStrict).error());

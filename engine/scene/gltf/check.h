@@ -5,8 +5,9 @@
 
 namespace stipple::scene::gltf {
 
-/// What is wrong with a file whose container could be read; empty: nothing. `buffers` is loaded on the way.
-Result<Problems> checkAll(const Container& container, Buffers& buffers);
+/// What is wrong with a file whose container could be read; empty: nothing. On the way `buffers` is loaded, and what is
+/// compressed with Draco unpacked.
+Result<Problems> checkAll(Container& container, Buffers& buffers);
 
 /// checkAll as one error: the first problem, and how many more there are. What cannot be drawn is refused; with
 /// `isStrict`, whatever the specification forbids. Otherwise those faults are mended or passed over, and are the

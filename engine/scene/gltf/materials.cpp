@@ -22,6 +22,7 @@ const std::map<std::string, std::set<std::string>>& places() {
         {"EXT_mesh_gpu_instancing", {"nodes"}},
         {"EXT_meshopt_compression", {"bufferViews", "buffers"}},
         {"KHR_mesh_quantization", {}},
+        {"KHR_draco_mesh_compression", {"primitives"}},
         {"KHR_materials_unlit", material},
         {"KHR_materials_anisotropy", material},
         {"KHR_materials_clearcoat", material},

@@ -318,7 +318,8 @@ const std::vector<std::string>& knownExtensions() {
     static const std::vector<std::string> known{
         "KHR_lights_punctual",    "KHR_texture_transform",   "EXT_mesh_gpu_instancing",    "KHR_mesh_quantization",
         "KHR_materials_ior",      "EXT_meshopt_compression", "KHR_materials_transmission", "KHR_materials_unlit",
-        "KHR_materials_specular", "KHR_materials_volume",    "EXT_texture_webp",           "STIPPLE_store"};
+        "KHR_materials_specular", "KHR_materials_volume",    "EXT_texture_webp",           "KHR_draco_mesh_compression",
+        "STIPPLE_store"};
     return known;
 }
 
