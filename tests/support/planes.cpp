@@ -45,6 +45,14 @@ Planes readPlanes(const std::string& path) {
     return out;
 }
 
+void writeBytes(const std::string& path, uint32_t width, uint32_t height, const std::vector<uint8_t>& rgba) {
+    const auto out = OIIO::ImageOutput::create(path);
+    OIIO::ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 4, OIIO::TypeDesc::UINT8);
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    if (!out || !out->open(path, spec) || !out->write_image(OIIO::TypeDesc::UINT8, rgba.data()) || !out->close())
+        throw std::runtime_error(path + ": " + (out ? out->geterror() : OIIO::geterror()));
+}
+
 uint64_t hashPlanes(const Planes& planes) {
     uint64_t hash = (uint64_t{planes.width} << 32) + planes.height + (planes.isFloat ? 1u << 31 : 0u);
     for (const std::string& name : planes.names) hash = hashBytes(name.data(), name.size(), hash);

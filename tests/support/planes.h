@@ -20,6 +20,9 @@ struct Planes {
 /// Throws std::runtime_error with the file's name where it cannot be read.
 Planes readPlanes(const std::string& path);
 
+/// Writes RGBA bytes, row by row from the top, in the format of the name's extension (.webp, ...). Throws likewise.
+void writeBytes(const std::string& path, uint32_t width, uint32_t height, const std::vector<uint8_t>& rgba);
+
 /// Of size, names and the bits of all values.
 uint64_t hashPlanes(const Planes& planes);
 

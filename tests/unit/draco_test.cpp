@@ -234,6 +234,15 @@ TEST_F(Draco, WhatTheMeshLacksIsNamed) {
     root = sceneOf(packed);
     root["meshes"][0]["primitives"][0]["mode"] = 1;
     expectRefused(root, packed.bytes, "has mode 1");
+    // Of skins nothing is drawn: what only they need is noted.
+    root = sceneOf(packed);
+    root["accessors"].push_back({{"componentType", 5121}, {"count", 16}, {"type", "VEC4"}});
+    root["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = root["accessors"].size() - 1;
+    const auto scene = read(root, packed.bytes);
+    ASSERT_TRUE(scene) << scene.error().line();
+    ASSERT_FALSE(scene->notes.empty());
+    EXPECT_NE(scene->notes[0].find("lacks the attribute that is to be its JOINTS_0"), std::string::npos)
+        << scene->notes[0];
 }
 
 TEST_F(Draco, CountsOfTheFileThatDifferFromTheMeshAreAFaultThatIsPassedOver) {

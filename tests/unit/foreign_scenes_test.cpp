@@ -1,6 +1,7 @@
 // Scene files of other programs: what can be drawn is drawn, with a note; what they name is read only where it may be;
 // what they promise is checked before memory is taken.
 #include <gtest/gtest.h>
+#include <meshoptimizer.h>
 #include <sys/stat.h>
 
 #include <filesystem>
@@ -95,6 +96,31 @@ TEST_F(ForeignScenes, FaultsThatChangeNothingDrawableAreNotedAndOnlyAStrictReade
          [](json& j) {
              j["nodes"][0]["rotation"] = {0, 0, 0, 1.0000001};
          }},
+        {"a buffer view of nothing",
+         [](json& j) {
+             j["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 36}, {"byteLength", 0}});
+         }},
+        {"an accessor of nothing",
+         [](json& j) {
+             j["accessors"].push_back({{"bufferView", 0}, {"componentType", 5126}, {"count", 0}, {"type", "VEC3"}});
+             j["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 1}, {"NORMAL", 1}}}, {"indices", 2}});
+             j["accessors"].push_back({{"componentType", 5125}, {"count", 0}, {"type", "SCALAR"}});
+         }},
+        {"a mesh of nothing",
+         [](json& j) {
+             j["meshes"].push_back({{"primitives", json::array()}});
+         }},
+        {"a stride of 0", [](json& j) { j["bufferViews"][0]["byteStride"] = 0; }},
+        {"members that are null",
+         [](json& j) {
+             j["meshes"][0]["primitives"][0]["indices"] = j["nodes"][0]["matrix"] = j["nodes"][0]["extensions"] =
+                 nullptr;
+             j["accessors"][0]["byteOffset"] = j["accessors"][0]["normalized"] = nullptr;
+         }},
+        {"a version that is a number", [](json& j) { j["asset"]["version"] = 2.0; }},
+        {"a buffer that is longer than its file", [](json& j) { j["buffers"][0]["byteLength"] = 40; }},
+        {"what things are, required",
+         [](json& j) { j["extensionsUsed"] = j["extensionsRequired"] = {"EXT_structural_metadata"}; }},
         {"unknown attributes", [](json& j) { j["meshes"][0]["primitives"][0]["attributes"]["COLOR"] = 0; }},
         {"a child of two",
          [](json& j) {
@@ -136,9 +162,10 @@ TEST_F(ForeignScenes, ContainersThatOtherViewersOpenAreRead) {
     const auto chunk = [&](const char* type, const std::string& body) {
         return word(body.size()) + std::string(type, 4) + body;
     };
-    const auto glb = [&](const std::string& text, const std::string& rest) {
+    // `more`: bytes that its head claims beyond those that are there.
+    const auto glb = [&](const std::string& text, const std::string& rest, int more = 0) {
         const std::string body = chunk("JSON", text) + rest;
-        return "glTF" + word(2) + word(12 + body.size()) + body;
+        return "glTF" + word(2) + word(12 + body.size() + static_cast<size_t>(more)) + body;
     };
     json inside = triangle();
     inside["buffers"][0].erase("uri");
@@ -146,12 +173,20 @@ TEST_F(ForeignScenes, ContainersThatOtherViewersOpenAreRead) {
     while (text.size() % 4 != 0) text += ' ';
     while (odd.size() % 4 != 3) odd += ' ';
     const std::string bin = chunk("BIN\0", points);
+    const json latin = triangle();
     const std::vector<std::tuple<const char*, std::string, std::string>> files{
         {"a.gltf", mark + triangle().dump(), "byte order mark"},
         {"a.glb", glb(mark + text + " ", bin), "byte order mark"},
         {"a.glb", glb(odd, bin), "not a multiple of 4"},
         {"a.glb", glb(text, chunk("MORE", "....") + bin), "must be the second"},
         {"a.glb", glb(text, bin + chunk("BIN\0", "....")), "second binary chunk"},
+        {"a.gltf", triangle().dump() + std::string(3, '\0'), "ends with zeros"},
+        {"a.glb", glb(text + std::string(4, '\0'), bin), "ends with zeros"},
+        {"a.gltf",
+         latin.dump(-1, ' ', false, json::error_handler_t::ignore).replace(0, 1, "{\"extras\":\"M\xfchle \xe9\","),
+         "not UTF-8"},
+        {"a.glb", glb(text, bin, 5), "says it has"},
+        {"a.glb", glb(text, bin, -3), "chunk 1 ends later"},
         {"a.glb", glb(text, bin + chunk("MORE", "....")), ""}};
     for (const auto& [name, bytes, note] : files) {
         spit(folder_ / name, bytes);
@@ -164,6 +199,83 @@ TEST_F(ForeignScenes, ContainersThatOtherViewersOpenAreRead) {
         strict.isStrict = true;
         EXPECT_EQ(readGltf(folder_ / name, strict).has_value(), note.empty()) << note;
     }
+    // What is cut off is refused wherever that is.
+    const std::string whole = glb(text, bin);
+    for (size_t length = 0; length < whole.size(); ++length) {
+        spit(folder_ / "a.glb", whole.substr(0, length));
+        EXPECT_FALSE(readGltf(folder_ / "a.glb")) << length;
+    }
+}
+
+TEST_F(ForeignScenes, WhatMattersOfThoseFaultsIsRefused) {
+    const auto refusal = [&](const auto& change) {
+        json root = triangle();
+        change(root);
+        const auto scene = read(root);
+        return scene ? std::string("none") : scene.error().line();
+    };
+    const auto expect = [&](const std::string& line, const std::string& text) {
+        EXPECT_NE(line.find(text), std::string::npos) << line;
+    };
+    spit(folder_ / "short.bin", floats({0, 0, 0, 1, 0, 0, 0, 1}));
+    expect(refusal([](json& j) { j["buffers"][0]["uri"] = "short.bin"; }), "reaches beyond the 32 bytes of its buffer");
+    expect(refusal([](json& j) { j["bufferViews"][0]["byteLength"] = 0; }),
+           "/accessors/0: 3 elements at 0 reach beyond");
+    expect(refusal([](json& j) { j["bufferViews"][0]["byteStride"] = 260; }),
+           "/accessors/0: 3 elements at 0 reach beyond");
+    expect(refusal([](json& j) { j["bufferViews"][0]["byteStride"] = -4; }), "/bufferViews/0/byteStride");
+    expect(refusal([](json& j) { j["bufferViews"][0]["byteLength"] = nullptr; }), "/bufferViews/0/byteLength");
+    expect(refusal([](json& j) { j["asset"]["version"] = 3; }), "is glTF 3.0, 2.0 is read");
+    expect(refusal([](json& j) { j["accessors"] = {{"a", j["accessors"][0]}}; }), "is glTF 1.0, 2.0 is read");
+    // A stride beyond what is allowed is what it says, and no instances are none.
+    std::string wide = floats({0, 0, 0});
+    for (const std::string& p : {floats({1, 0, 0}), floats({0, 1, 0})}) wide += std::string(248, '?') + p;
+    spit(folder_ / "wide.bin", wide);
+    json root = triangle();
+    root["buffers"][0] = {{"uri", "wide.bin"}, {"byteLength", wide.size()}};
+    root["bufferViews"][0] = {{"buffer", 0}, {"byteLength", wide.size()}, {"byteStride", 260}};
+    auto scene = read(root);
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_EQ(scene->meshes[0].primitives[0].position[2], glm::vec3(0, 1, 0));
+    root = triangle();
+    root["accessors"].push_back({{"componentType", 5126}, {"count", 0}, {"type", "VEC3"}});
+    root["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+    root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = 1;
+    scene = read(root);
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_EQ(trianglesOf(*scene), 0u);
+}
+
+TEST_F(ForeignScenes, MeshoptUnderItsNewerNameIsReadAndWhatThatAddsIsNamed) {
+    const std::array<float, 9> points{0, 0, 0, 1, 0, 0, 0, 1, 0};
+    std::vector<unsigned char> coded(meshopt_encodeVertexBufferBound(3, 12));
+    coded.resize(meshopt_encodeVertexBuffer(coded.data(), coded.size(), points.data(), 3, 12));
+    constexpr const char* kName = "KHR_meshopt_compression";
+    json root = triangle();
+    root["extensionsUsed"] = root["extensionsRequired"] = {kName};
+    root["buffers"] = {{{"byteLength", coded.size()}, {"uri", "coded.bin"}},
+                       {{"byteLength", 36}, {"extensions", {{kName, {{"fallback", true}}}}}}};
+    const json how{
+        {"buffer", 0}, {"byteLength", coded.size()}, {"byteStride", 12}, {"count", 3}, {"mode", "ATTRIBUTES"}};
+    root["bufferViews"][0] = {{"buffer", 1}, {"byteLength", 36}, {"byteStride", 12}, {"extensions", {{kName, how}}}};
+    const auto readWith = [&] {
+        spit(folder_ / "coded.bin", std::string(coded.begin(), coded.end()));
+        return read(root);
+    };
+    auto scene = readWith();
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_EQ(notesOf(*scene), "");
+    EXPECT_EQ(scene->meshes[0].primitives[0].position[1], glm::vec3(1, 0, 0));
+    coded[0] = 0xa1;
+    scene = readWith();
+    ASSERT_FALSE(scene);
+    EXPECT_NE(scene.error().line().find("codec 1 of KHR_meshopt_compression"), std::string::npos)
+        << scene.error().line();
+    root["bufferViews"][0]["extensions"][kName]["filter"] = "COLOR";
+    scene = readWith();
+    ASSERT_FALSE(scene);
+    EXPECT_NE(scene.error().line().find("/bufferViews/0: is compressed with the filter COLOR"), std::string::npos)
+        << scene.error().line();
 }
 
 TEST_F(ForeignScenes, TexturesOfGpuFormatsAreNamedOneByOneAndThoseOfWebpAreNotCalledAFault) {

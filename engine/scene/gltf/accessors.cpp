@@ -88,13 +88,6 @@ std::vector<size_t> componentOffsets(const std::string& type, int componentType)
     return offsets;
 }
 
-const json* compression(const json& value) {
-    const auto found = value.find("extensions");
-    if (found == value.end()) return nullptr;
-    const auto extension = found->find("EXT_meshopt_compression");
-    return extension == found->end() ? nullptr : &*extension;
-}
-
 }  // namespace
 
 Result<void> Buffers::fits(uint64_t bytes, const std::string& what) const {
@@ -109,7 +102,7 @@ Result<void> Buffers::claim(uint64_t bytes, const std::string& what) {
     return {};
 }
 
-Result<void> Buffers::load() {
+Result<void> Buffers::load(Problems& problems) {
     STIPPLE_TRY(claim(container_.fileBytes, "the file"));
     const json& buffers = arrayOf(container_.json, "buffers");
     buffers_.resize(buffers.size());
@@ -125,16 +118,15 @@ Result<void> Buffers::load() {
         STIPPLE_ASSIGN(buffers_[i], fetch(container_, buffers[i]["uri"].get<std::string>(), where, settings_));
         STIPPLE_TRY(claim(buffers_[i].size(), "the buffers"));
         if (buffers_[i].size() < buffers[i]["byteLength"].get<uint64_t>())
-            return fail(ErrorKind::input,
-                        fmt::format("has {} bytes instead of {}", buffers_[i].size(), buffers[i]["byteLength"].dump()),
-                        where, "the buffer is truncated");
+            sayHarmless(problems, fmt::format("/buffers/{}", i),
+                        fmt::format("has {} bytes instead of {}", buffers_[i].size(), buffers[i]["byteLength"].dump()));
     }
     return {};
 }
 
 Result<void> Buffers::decompress(size_t index) {
     const json& view = container_.json["bufferViews"][index];
-    const json& c = *compression(view);
+    const json& c = meshoptOf(view);
     const std::string where = fmt::format("{}: /bufferViews/{}", container_.path, index);
     const auto& source = buffers_[c["buffer"].get<size_t>()];
     const auto offset = c.value("byteOffset", size_t{0}), length = c["byteLength"].get<size_t>();
@@ -154,6 +146,13 @@ Result<void> Buffers::decompress(size_t index) {
         (mode == "TRIANGLES" && count % 3 != 0))
         return fail(ErrorKind::input,
                     fmt::format("{} of {} elements with {} bytes is not possible", mode, count, stride), where);
+    constexpr uint8_t kNewerVertices = 0xa1;
+    if (filter == "COLOR" || (mode == "ATTRIBUTES" && length > 0 && source[offset] == kNewerVertices))
+        return fail(ErrorKind::input,
+                    filter == "COLOR"
+                        ? "is compressed with the filter COLOR of KHR_meshopt_compression, which is not read"
+                        : "is compressed with codec 1 of KHR_meshopt_compression, which is not read",
+                    where, "save it with EXT_meshopt_compression, or not compressed");
     STIPPLE_TRY(claim(count * stride, "the compressed buffers"));
     std::vector<uint8_t> out(count * stride);
     const uint8_t* from = source.data() + offset;
@@ -175,15 +174,15 @@ Result<void> Buffers::decompress(size_t index) {
 
 Result<std::span<const uint8_t>> Buffers::view(size_t index) {
     const json& view = container_.json["bufferViews"][index];
-    if (compression(view)) {
+    if (!meshoptOf(view).is_null()) {
         if (decompressed_.count(index) == 0) STIPPLE_TRY(decompress(index));
         return std::span<const uint8_t>(decompressed_[index]);
     }
     const auto& buffer = buffers_[view["buffer"].get<size_t>()];
     const auto offset = view.value("byteOffset", size_t{0}), length = view["byteLength"].get<size_t>();
     if (offset > buffer.size() || length > buffer.size() - offset)
-        return fail(ErrorKind::input, "reaches beyond its buffer",
-                    fmt::format("{}: /bufferViews/{}", container_.path, index));
+        return fail(ErrorKind::input, fmt::format("reaches beyond the {} bytes of its buffer", buffer.size()),
+                    fmt::format("{}: /bufferViews/{}", container_.path, index), "the buffer is truncated");
     return std::span<const uint8_t>(buffer).subspan(offset, length);
 }
 
@@ -198,6 +197,7 @@ Result<std::vector<double>> Buffers::values(size_t index) {
     STIPPLE_TRY(fits(count > UINT64_MAX / kEach / offsets.size() ? UINT64_MAX : count * offsets.size() * kEach,
                      fmt::format("/accessors/{} with {} elements", index, count)));
     std::vector<double> out(count * offsets.size(), 0.0);
+    if (count == 0) return out;
     if (a.contains("bufferView")) {
         const auto viewIndex = a["bufferView"].get<size_t>();
         STIPPLE_ASSIGN(const std::span<const uint8_t> bytes, view(viewIndex));
@@ -249,7 +249,7 @@ Result<std::vector<uint32_t>> Buffers::indices(size_t accessor) {
 bool Buffers::hasData(const json& accessor) const {
     const auto isThere = [&](size_t viewIndex) {
         const json& view = container_.json["bufferViews"][viewIndex];
-        return compression(view) != nullptr || !buffers_[view["buffer"].get<size_t>()].empty();
+        return !meshoptOf(view).is_null() || !buffers_[view["buffer"].get<size_t>()].empty();
     };
     if (accessor.contains("bufferView") && !isThere(accessor["bufferView"].get<size_t>())) return false;
     if (!accessor.contains("sparse")) return accessor.contains("bufferView");

@@ -16,8 +16,9 @@ class Buffers {
     /// `container` must outlive it; its structure and extents must have been checked.
     explicit Buffers(const Container& container, ReadSettings settings = {})
         : container_(container), settings_(settings) {}
-    /// Loads every buffer; an error names the one that is missing or too short.
-    Result<void> load();
+    /// Loads every buffer; an error names the one that is missing. One that is too short is a fault that matters only
+    /// where something lies in what is missing.
+    Result<void> load(Problems& problems);
     /// The bytes of a buffer view, decompressed if it is compressed.
     Result<std::span<const uint8_t>> view(size_t index);
     /// All values of an accessor, count * components, normalised where it says so.

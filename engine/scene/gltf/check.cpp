@@ -22,7 +22,7 @@ Result<Problems> checkAll(Container& c, Buffers& buffers) {
     checkAnimationsAndSkins(c.json, p);
     checkMaterialsAndExtensions(c.json, p);
     if (mattersAny(p)) return p;
-    STIPPLE_TRY(buffers.load());
+    STIPPLE_TRY(buffers.load(p));
     STIPPLE_TRY(unpackDraco(c, buffers, p));
     STIPPLE_TRY(checkValues(c, buffers, p));
     STIPPLE_TRY(checkImageBytes(c, buffers, p));
@@ -44,9 +44,7 @@ Result<void> checkRequired(const Container& c, bool isStrict, std::vector<std::s
             passedOver.push_back("/extensionsRequired: requires " + text + ", which is not drawn");
             continue;
         }
-        return fail(
-            ErrorKind::input, fmt::format("requires the extension {}, which is not supported", text), c.path,
-            text == "KHR_meshopt_compression" ? "EXT_meshopt_compression is: save it so, or not compressed" : "");
+        return fail(ErrorKind::input, fmt::format("requires the extension {}, which is not supported", text), c.path);
     }
     return {};
 }

@@ -81,11 +81,44 @@ uint64_t memoryOfJson(const char* begin, const char* end) {
     return bytes + static_cast<uint64_t>(end - begin);
 }
 
+/// Where a UTF-8 text is none, from `p` on (RFC 3629; what a parser of JSON takes); `end`: nowhere.
+const char* faultOfUtf8(const char* p, const char* end) {
+    while (p < end) {
+        const auto lead = static_cast<unsigned char>(*p);
+        const int more = lead < 0x80 ? 0 : lead < 0xc2 ? -1 : lead < 0xe0 ? 1 : lead < 0xf0 ? 2 : lead < 0xf5 ? 3 : -1;
+        if (more < 0 || end - p <= more) return p;
+        for (int k = 1; k <= more; ++k) {
+            const auto c = static_cast<unsigned char>(p[k]);
+            const unsigned least = k > 1          ? 0x80
+                                   : lead == 0xe0 ? 0xa0
+                                   : lead == 0xf0 ? 0x90
+                                                  : 0x80,
+                           most = k > 1          ? 0xbf
+                                  : lead == 0xed ? 0x9f
+                                  : lead == 0xf4 ? 0x8f
+                                                 : 0xbf;
+            if (c < least || c > most) return p;
+        }
+        p += 1 + more;
+    }
+    return end;
+}
+
 Result<nlohmann::json> parseJson(const char* begin, const char* end, Container& c, uint64_t memoryBytes) {
     const std::string& path = c.path;
     if (end - begin >= 3 && std::memcmp(begin, "\xef\xbb\xbf", 3) == 0) {
         begin += 3;
         c.oddities.emplace_back("the JSON begins with a byte order mark");
+    }
+    if (end > begin && end[-1] == '\0') c.oddities.emplace_back("the JSON ends with zeros");
+    while (end > begin && end[-1] == '\0') --end;
+    std::string mended;  // names in another character set
+    if (const char* fault = faultOfUtf8(begin, end); fault < end) {
+        c.oddities.push_back(fmt::format("the JSON is not UTF-8 (at byte {})", fault - begin));
+        mended.assign(begin, end);
+        begin = mended.data();
+        end = begin + mended.size();
+        for (const char* p = begin; (p = faultOfUtf8(p, end)) < end;) mended[static_cast<size_t>(p - begin)] = '?';
     }
     if (const uint64_t needed = memoryOfJson(begin, end); needed > memoryBytes)
         return overBudget("its JSON", needed, memoryBytes, path);
@@ -106,14 +139,22 @@ Result<nlohmann::json> parseJson(const char* begin, const char* end, Container& 
     }
 }
 
+tl::unexpected<Error> refuseVersion1(const std::string& path) {
+    return fail(ErrorKind::input, "is glTF 1.0, 2.0 is read", path, "convert it, e.g. with gltf-pipeline");
+}
+
 Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c, uint64_t memoryBytes) {
     const auto bad = [&](const std::string& what) {
         return fail(ErrorKind::input, what, c.path, "the .glb file is damaged");
     };
     if (bytes.size() < 12) return bad(fmt::format("has {} bytes, a .glb header has 12", bytes.size()));
+    if (wordAt(bytes, 4) == 1) return refuseVersion1(c.path);
     if (wordAt(bytes, 4) != 2) return bad(fmt::format("has .glb version {}, expected 2", wordAt(bytes, 4)));
-    const uint32_t length = wordAt(bytes, 8);
-    if (length > bytes.size()) return bad(fmt::format("says it has {} bytes, but has {}", length, bytes.size()));
+    size_t length = wordAt(bytes, 8);
+    if (length > bytes.size()) {  // all the same if the chunks are whole
+        c.oddities.push_back(fmt::format("says it has {} bytes, but has {}", length, bytes.size()));
+        length = bytes.size();
+    }
     if (length < 20) return bad(fmt::format("has {} bytes, too few for a chunk", length));
     c.isBinary = true;
     bool hasJson = false;
@@ -124,9 +165,13 @@ Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c, uin
         if (size % 4 != 0)
             c.oddities.push_back(
                 fmt::format("chunk {} at offset {} has {} bytes, not a multiple of 4", chunk, at, size));
-        if (size > length - at - 8)
-            return bad(
-                fmt::format("chunk {} at offset {} has {} bytes, only {} are left", chunk, at, size, length - at - 8));
+        if (size > bytes.size() - at - 8)
+            return bad(fmt::format("chunk {} at offset {} has {} bytes, only {} are left", chunk, at, size,
+                                   bytes.size() - at - 8));
+        if (size > length - at - 8) {
+            c.oddities.push_back(fmt::format("says it has {} bytes, but chunk {} ends later", length, chunk));
+            length = at + 8 + size;
+        }
         if (chunk == 0 && type != kJsonChunk)
             return bad(fmt::format("the first chunk has type {:#x}, expected JSON", type));
         if (chunk > 0 && type == kJsonChunk)
@@ -175,6 +220,9 @@ Result<Container> readContainer(const std::string& path, uint64_t memoryBytes) {
     if (isNamedBinary) return fail(ErrorKind::input, "does not begin with glTF", path, "is it a .glb file?");
     const auto* text = reinterpret_cast<const char*>(bytes.data());
     STIPPLE_ASSIGN(c.json, parseJson(text, text + bytes.size(), c, memoryBytes));
+    // Its lists are objects, by names.
+    if (const auto lists = c.json.find("accessors"); lists != c.json.end() && lists->is_object())
+        return refuseVersion1(path);
     return c;
 }
 

@@ -275,7 +275,14 @@ class Unpacker {
             if (!ids.contains(name) && isPlain(index, false)) continue;
             const auto id = ids.contains(name) ? indexOf(ids[name], 4294967296.0) : std::nullopt;
             const draco::PointAttribute* of = id ? mesh->GetAttributeByUniqueId(static_cast<uint32_t>(*id)) : nullptr;
-            if (!of) return refuse(fmt::format("its Draco data lacks the attribute that is to be its {}", name));
+            if (!of) {
+                const std::string what = fmt::format("its Draco data lacks the attribute that is to be its {}", name);
+                const bool isOfSkins = name.rfind("JOINTS_", 0) == 0 || name.rfind("WEIGHTS_", 0) == 0;
+                if (!isOfSkins) return refuse(what);
+                sayHarmless(problems_, here_, what);
+                primitive["attributes"].erase(name);
+                continue;
+            }
             STIPPLE_ASSIGN(primitive["attributes"][name], addAttribute(*mesh, *of, name, index.get<size_t>(), out));
         }
         STIPPLE_ASSIGN(primitive["indices"], addIndices(*mesh, primitive, out));

@@ -62,6 +62,13 @@ inline const nlohmann::json& extensionOf(const nlohmann::json& value, const char
     return found == all->end() ? none : *found;
 }
 
+/// How a buffer view is compressed, or what a buffer stands for; null: it is plain. The extension of Khronos is the
+/// older one with another version of the codec and one more filter.
+inline const nlohmann::json& meshoptOf(const nlohmann::json& value) {
+    const nlohmann::json& older = extensionOf(value, "EXT_meshopt_compression");
+    return older.is_null() ? extensionOf(value, "KHR_meshopt_compression") : older;
+}
+
 inline bool hasStride(const nlohmann::json& root, const nlohmann::json& accessor) {
     return accessor.contains("bufferView") &&
            root["bufferViews"][accessor["bufferView"].get<size_t>()].contains("byteStride");

@@ -21,6 +21,7 @@ const std::map<std::string, std::set<std::string>>& places() {
         {"KHR_texture_transform", {"textureInfo"}},
         {"EXT_mesh_gpu_instancing", {"nodes"}},
         {"EXT_meshopt_compression", {"bufferViews", "buffers"}},
+        {"KHR_meshopt_compression", {"bufferViews", "buffers"}},
         {"KHR_mesh_quantization", {}},
         {"KHR_draco_mesh_compression", {"primitives"}},
         {"KHR_materials_unlit", material},

@@ -57,6 +57,7 @@ class Reader {
         const json& accessor = root_["accessors"][attributes[name].get<size_t>()];
         const auto count = accessor["count"].get<size_t>();
         STIPPLE_ASSIGN(const std::vector<double> values, buffers_.values(attributes[name].get<size_t>()));
+        if (count == 0) return out;
         STIPPLE_TRY(buffers_.claim(count * sizeof(V), "its vertices"));
         const auto has = static_cast<int>(values.size() / count);
         out.resize(count, V(fill));
@@ -209,6 +210,11 @@ class Reader {
         for (const size_t n : {translations.size(), rotations.size(), scales.size()})
             if (n != 0 && n != count)
                 return fail(ErrorKind::input, "attributes of instances differ in their number", c_.path);
+        const auto has = [&](const char* name) { return attributes.contains(name); };
+        if (count == 0 && (has("TRANSLATION") || has("ROTATION") || has("SCALE"))) {  // none, and not itself either
+            node.mesh = -1;
+            node.store.clear();
+        }
         for (size_t i = 0; i < count; ++i) {
             glm::dmat4 m(1);
             if (!translations.empty()) m = glm::translate(m, glm::dvec3(translations[i]));

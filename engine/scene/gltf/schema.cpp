@@ -99,7 +99,8 @@ bool canBeLeftOut(const std::string& name) {
 /// Without these extensions something else would be drawn than what the file means.
 bool decidesGeometry(const std::string& extension) {
     return extension == "EXT_mesh_gpu_instancing" || extension == "EXT_meshopt_compression" ||
-           extension == "KHR_mesh_quantization" || extension == "STIPPLE_store";
+           extension == "KHR_meshopt_compression" || extension == "KHR_mesh_quantization" ||
+           extension == "STIPPLE_store";
 }
 
 class Checker {
@@ -122,9 +123,13 @@ class Checker {
                 const auto test = [&, &member = member](Checker& by) {
                     by.check(member, rule->second.what, rule->second.arguments, at);
                 };
-                if (isOptional && member.is_array() && member.empty() && rule->second.what != "any") {
-                    sayHarmless(at, "is empty");
+                const bool isEmpty = member.is_array() && member.empty() && rule->second.what != "any";
+                if (isOptional && (isEmpty || member.is_null())) {
+                    sayHarmless(at, isEmpty ? "is empty" : "is null");
                     mend(at);
+                } else if (isEmpty && key == "primitives") {  // a mesh of nothing; others are counted from it
+                    sayHarmless(at, "is empty");
+                    mend(at, json::array({{{"attributes", json::object()}}}));
                 } else if (isOptional && canBeLeftOut(key))
                     orLeaveOut(at, test);
                 else
@@ -159,6 +164,10 @@ class Checker {
     }
 
     void extensions(const json& value, const std::string& path) {
+        if (value.is_null()) {
+            sayHarmless(path, "is null");
+            return mend(path);
+        }
         if (!value.is_object()) return say(path, "must be an object");
         for (const auto& [name, member] : value.items()) {
             const std::string at = below(path, name);
@@ -181,7 +190,8 @@ class Checker {
         if (isDefinition && name == "KHR_lights_punctual" && !member.contains("lights")) say(at, "lacks 'lights'");
         if (isDefinition && name == "KHR_materials_variants" && !member.contains("variants"))
             say(at, "lacks 'variants'");
-        if (name == "EXT_meshopt_compression" && path.rfind("/buffers/", 0) == 0) return;  // only says what it is
+        // Only says what it is.
+        if (name.find("_meshopt_compression") != std::string::npos && path.rfind("/buffers/", 0) == 0) return;
         const bool isMapping = name == "KHR_materials_variants" && !isDefinition;
         if (isMapping && !member.contains("mappings")) say(at, "lacks 'mappings'");
         if (name == "KHR_animation_pointer" && member.contains("pointer") && member["pointer"].is_string() &&
@@ -195,6 +205,16 @@ class Checker {
         if (what == "any") return;
         if (what == "bool" && !v.is_boolean()) return say(path, "must be true or false");
         if (what == "bool") return;
+        if (what == "stride") {
+            number(v, true, {"0"}, path);
+            if (v != 0) return;  // others are checked with their views
+            sayHarmless(path, "is 0, must be at least 4");
+            return mend(path);
+        }
+        if (what == "version" && v.is_number()) {
+            sayHarmless(path, fmt::format("is {}, must be a string", v.dump()));
+            return mend(path, fmt::format("{:.1f}", v.get<double>()));
+        }
         if (what == "string" || what == "version" || what == "uri") return text(v, what, path);
         if (what == "int" || what == "num") return number(v, what == "int", arguments, path);
         if (what == "enum") return oneOf(v, arguments, path);
@@ -315,18 +335,23 @@ void applyMends(const Mends& mends, json& root) {
 }
 
 const std::vector<std::string>& knownExtensions() {
-    static const std::vector<std::string> known{
-        "KHR_lights_punctual",    "KHR_texture_transform",   "EXT_mesh_gpu_instancing",    "KHR_mesh_quantization",
-        "KHR_materials_ior",      "EXT_meshopt_compression", "KHR_materials_transmission", "KHR_materials_unlit",
-        "KHR_materials_specular", "KHR_materials_volume",    "EXT_texture_webp",           "KHR_draco_mesh_compression",
-        "STIPPLE_store"};
+    static const std::vector<std::string> known{"KHR_lights_punctual",        "KHR_texture_transform",
+                                                "EXT_mesh_gpu_instancing",    "KHR_mesh_quantization",
+                                                "KHR_materials_ior",          "EXT_meshopt_compression",
+                                                "KHR_meshopt_compression",    "KHR_materials_transmission",
+                                                "KHR_materials_unlit",        "KHR_materials_specular",
+                                                "KHR_materials_volume",       "EXT_texture_webp",
+                                                "KHR_draco_mesh_compression", "STIPPLE_store"};
     return known;
 }
 
 bool isAboutLooks(const std::string& extension) {
-    static const std::set<std::string> more{"KHR_animation_pointer", "KHR_technique_webgl",   "KHR_techniques_webgl",
-                                            "KHR_node_visibility",   "KHR_xmp_json_ld",       "EXT_lights_image_based",
-                                            "MSFT_texture_dds",      "KHR_lights_environment"};
+    static const std::set<std::string> more{
+        "KHR_animation_pointer",    "KHR_technique_webgl",    "KHR_techniques_webgl", "KHR_node_visibility",
+        "KHR_xmp_json_ld",          "EXT_lights_image_based", "MSFT_texture_dds",     "KHR_lights_environment",
+        "EXT_mesh_features",        "EXT_instance_features",  "EXT_feature_metadata", "EXT_structural_metadata",
+        "CESIUM_primitive_outline", "EXT_mesh_manifold",      "FB_ngon_encoding",     "KHR_xmp",
+        "AGI_articulations",        "AGI_stk_metadata"};
     const auto begins = [&](const char* with) { return extension.rfind(with, 0) == 0; };
     return begins("KHR_materials_") || begins("KHR_texture_") || begins("EXT_texture_") || more.count(extension) != 0;
 }

@@ -26,7 +26,7 @@ void applyMends(const Mends& mends, nlohmann::json& root);
 
 /// Extensions that are understood.
 const std::vector<std::string>& knownExtensions();
-/// Does it only change how something looks, so that a file that requires it can be drawn without?
+/// Does it only change how something looks, or say what it is, so that a file that requires it can be drawn without?
 bool isAboutLooks(const std::string& extension);
 
 }  // namespace stipple::scene::gltf

@@ -8,6 +8,7 @@ namespace stipple::scene::gltf {
 ///   enum A B ...           numbers or words                              @name  an index into the root's array `name`
 ///   array MIN MAX what     of so many items ("*": no limit)              set    an array without equal items
 ///   map what               an object with values of one kind             NAME   an object of that type
+///   stride                 of the elements of a buffer view
 inline constexpr const char* kTable = R"(
 root asset! asset
 root scene @scenes
@@ -55,7 +56,7 @@ accessor bufferView @bufferViews
 accessor byteOffset int 0
 accessor componentType! enum 5120 5121 5122 5123 5125 5126
 accessor normalized bool
-accessor count! int 1
+accessor count! int 0
 accessor type! enum SCALAR VEC2 VEC3 VEC4 MAT2 MAT3 MAT4
 accessor min array 1 16 num
 accessor max array 1 16 num
@@ -70,12 +71,12 @@ sparseValues bufferView! @bufferViews
 sparseValues byteOffset int 0
 buffer name string
 buffer uri uri
-buffer byteLength! int 1
+buffer byteLength! int 0
 bufferView name string
 bufferView buffer! @buffers
 bufferView byteOffset int 0
-bufferView byteLength! int 1
-bufferView byteStride int 4 252
+bufferView byteLength! int 0
+bufferView byteStride stride
 bufferView target enum 34962 34963
 material name string
 material pbrMetallicRoughness pbr
@@ -158,6 +159,13 @@ EXT_meshopt_compression byteStride! int 1 256
 EXT_meshopt_compression count! int 1
 EXT_meshopt_compression mode! enum ATTRIBUTES TRIANGLES INDICES
 EXT_meshopt_compression filter enum NONE OCTAHEDRAL QUATERNION EXPONENTIAL
+KHR_meshopt_compression buffer! @buffers
+KHR_meshopt_compression byteOffset int 0
+KHR_meshopt_compression byteLength! int 1
+KHR_meshopt_compression byteStride! int 1 256
+KHR_meshopt_compression count! int 1
+KHR_meshopt_compression mode! enum ATTRIBUTES TRIANGLES INDICES
+KHR_meshopt_compression filter enum NONE OCTAHEDRAL QUATERNION EXPONENTIAL COLOR
 STIPPLE_store uri! uri
 EXT_texture_webp source @images
 KHR_texture_basisu source @images

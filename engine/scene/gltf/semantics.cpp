@@ -325,9 +325,9 @@ namespace {
 void checkBuffers(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t binaryBytes, Problems& p) {
     const json& buffers = arrayOf(root, "buffers");
     for (size_t i = 0; i < buffers.size(); ++i) {
-        const bool isFallback =
-            buffers[i].contains("extensions") && buffers[i]["extensions"].contains("EXT_meshopt_compression");
+        const bool isFallback = !meshoptOf(buffers[i]).is_null();
         const auto length = buffers[i]["byteLength"].get<uint64_t>();
+        if (length == 0) sayHarmless(p, at("buffers", i), "has no bytes");
         if (buffers[i].contains("uri") || isFallback) continue;
         if (i == 0 && isBinary && !hasBinaryChunk)
             say(p, at("buffers", i), "has no 'uri' and there is no binary chunk for it");
@@ -348,8 +348,11 @@ std::vector<int> checkViews(const json& root, Problems& p) {
         if (offset > bufferBytes || length > bufferBytes - offset)
             say(p, at("bufferViews", i),
                 fmt::format("{} bytes at {} reach beyond the buffer's {}", length, offset, bufferBytes));
+        if (length == 0) sayHarmless(p, at("bufferViews", i), "has no bytes");
         if (v.contains("byteStride")) {
             const auto stride = v["byteStride"].get<uint64_t>();
+            if (stride < 4 || stride > 252)
+                sayHarmless(p, at("bufferViews", i), fmt::format("'byteStride' {} is not 4 to 252", stride));
             if (stride % 4 != 0)
                 sayHarmless(p, at("bufferViews", i), fmt::format("'byteStride' {} is not a multiple of 4", stride));
             if (stride > length)
@@ -377,7 +380,7 @@ void checkRange(const json& views, const std::string& path, const Range& range, 
         sayHarmless(p, path, fmt::format("elements of {} bytes do not fit a 'byteStride' of {}", element, stride));
     if (offset % component != 0 || (v.value("byteOffset", uint64_t{0}) + offset) % component != 0)
         sayHarmless(p, path, fmt::format("does not begin at a multiple of {} bytes", component));
-    if (offset > length || last > length - offset || (count - 1) > (length - offset - last) / stride)
+    if (count > 0 && (offset > length || last > length - offset || (count - 1) > (length - offset - last) / stride))
         say(p, path,
             fmt::format("{} elements at {} reach beyond the {} bytes of buffer view {}", count, offset, length, view));
 }
@@ -411,6 +414,7 @@ void checkAccessors(const json& root, Problems& p) {
         const auto type = a["type"].get<std::string>();
         const int component = a["componentType"].get<int>();
         const auto count = a["count"].get<uint64_t>();
+        if (count == 0) sayHarmless(p, at("accessors", i), "has no elements");
         if (a.contains("bufferView"))
             checkRange(
                 views, at("accessors", i),
