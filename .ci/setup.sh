@@ -36,7 +36,7 @@ install_packages() {
 
 # build_program: what ./run needs and no more: a test that is not compiled keeps nobody waiting.
 build_program() {
-    [ -f build/build.ninja ] || configure release -DBUILD_TESTING=OFF || return 1
+    [ -f build/build.ninja ] || configure release -DBUILD_TESTING=OFF -DCMAKE_UNITY_BUILD=ON || return 1
     compile build --target stipple
 }
 
@@ -45,7 +45,7 @@ build_preset() {
     local folder=build-$1
     [ "$1" = release ] && folder=build
     if [ ! -f "$folder/build.ninja" ] || grep -q '^BUILD_TESTING:BOOL=OFF' "$folder/CMakeCache.txt"; then
-        configure "$1" -DBUILD_TESTING=ON || return 1
+        configure "$1" -DBUILD_TESTING=ON $([ "$1" = release ] && echo -DCMAKE_UNITY_BUILD=ON) || return 1
     fi
     compile "$folder"
 }
