@@ -18,61 +18,6 @@ namespace {
 
 constexpr uint64_t kRetryFrames = 120;
 
-/// A chunk as it is in the file.
-struct Stored {
-    std::vector<uint8_t> bytes, weights;  ///< attributes that are wanted stand behind the chunk's own
-};
-struct Asked {
-    std::shared_ptr<const ByteSource> source;
-    const lod::Hierarchy* hierarchy;
-    std::shared_ptr<const ChunkFinish> finish;
-    ChunkKey key;
-    std::string where;
-    size_t attributeBytes() const {
-        const bool isWanted = finish->wantsAttributes && !hierarchy->isTile(key.chunk);
-        return isWanted ? hierarchy->payload(key.chunk).attributeBytes : 0;
-    }
-    const lod::Stream* weights() const {
-        return hierarchy->isTile(key.chunk) ? nullptr : lod::weightsOf(*hierarchy, key.chunk);
-    }
-};
-
-Result<Stored> readStored(const Asked& asked) {
-    const lod::ChunkPlace place = lod::chunkPlace(*asked.hierarchy, asked.key.chunk);
-    Stored stored;
-    stored.bytes.resize(place.bytes + asked.attributeBytes());
-    STIPPLE_TRY(asked.source->readAt(place.offset, stored.bytes.data(), stored.bytes.size()));
-    if (const lod::Stream* weights = asked.weights()) {
-        stored.weights.resize(weights->bytes);
-        STIPPLE_TRY(asked.source->readAt(weights->offset, stored.weights.data(), stored.weights.size()));
-    }
-    return stored;
-}
-
-Result<lod::Chunk> decode(const Asked& asked, const Stored& stored) {
-    const lod::Hierarchy& h = *asked.hierarchy;
-    const lod::ChunkPlace place = lod::chunkPlace(h, asked.key.chunk);
-    const auto damaged = [&](const char* what) {
-        return fail(ErrorKind::input, fmt::format("the hash of {} does not match", what), asked.where,
-                    "the store is damaged; build it again");
-    };
-    const size_t attributeBytes = asked.attributeBytes();
-    const uint8_t* const attributes = stored.bytes.data() + place.bytes;
-    if (hashBytes(stored.bytes.data(), place.bytes) != place.hash ||
-        (attributeBytes > 0 && hashBytes(attributes, attributeBytes) != h.payload(asked.key.chunk).attributeHash))
-        return damaged("a chunk");
-    STIPPLE_ASSIGN(lod::Chunk chunk,
-                   lod::decodeStored(h, asked.key.chunk, stored.bytes.data(), place.bytes, asked.where, false));
-    if (asked.finish->apply) STIPPLE_TRY(asked.finish->apply(asked.key.chunk, chunk, attributes, attributeBytes));
-    if (const lod::Stream* weights = asked.weights()) {
-        if (hashBytes(stored.weights.data(), stored.weights.size()) != weights->hash)
-            return damaged("the weights of a chunk");
-        STIPPLE_ASSIGN(chunk.weights, lod::decodeWeights(stored.weights.data(), stored.weights.size(),
-                                                         h.payload(asked.key.chunk).records, asked.where));
-    }
-    return chunk;
-}
-
 /// Tasks of an executor throw nothing: a chunk for which there is no memory is one that failed.
 template <typename Work>
 auto orFail(const Work& work) noexcept -> decltype(work()) {
@@ -86,6 +31,57 @@ auto orFail(const Work& work) noexcept -> decltype(work()) {
 }
 
 }  // namespace
+
+struct Streamer::Request {
+    ChunkKey key;
+    const Source* source = nullptr;
+    /// As it is in the file; attributes that are wanted stand behind the chunk's own bytes.
+    std::vector<uint8_t> bytes, weights;
+    Result<lod::Chunk> chunk;
+
+    size_t attributeBytes() const {
+        const lod::Hierarchy& h = *source->hierarchy;
+        return source->finish.wantsAttributes && !h.isTile(key.chunk) ? h.payload(key.chunk).attributeBytes : 0;
+    }
+    const lod::Stream* weightsPlace() const {
+        return source->hierarchy->isTile(key.chunk) ? nullptr : lod::weightsOf(*source->hierarchy, key.chunk);
+    }
+    Result<void> read();
+    Result<lod::Chunk> decode() const;
+};
+
+Result<void> Streamer::Request::read() {
+    const lod::ChunkPlace place = lod::chunkPlace(*source->hierarchy, key.chunk);
+    bytes.resize(place.bytes + attributeBytes());
+    STIPPLE_TRY(source->bytes->readAt(place.offset, bytes.data(), bytes.size()));
+    const lod::Stream* const stream = weightsPlace();
+    if (stream == nullptr) return {};
+    weights.resize(stream->bytes);
+    return source->bytes->readAt(stream->offset, weights.data(), weights.size());
+}
+
+Result<lod::Chunk> Streamer::Request::decode() const {
+    const lod::Hierarchy& h = *source->hierarchy;
+    const lod::ChunkPlace place = lod::chunkPlace(h, key.chunk);
+    const std::string where = fmt::format("{}: chunk {}", source->name, key.chunk);
+    const auto damaged = [&](const char* what) {
+        return fail(ErrorKind::input, fmt::format("the hash of {} does not match", what), where,
+                    "the store is damaged; build it again");
+    };
+    const size_t ofAttributes = attributeBytes();
+    const uint8_t* const attributes = bytes.data() + place.bytes;
+    if (hashBytes(bytes.data(), place.bytes) != place.hash ||
+        (ofAttributes > 0 && hashBytes(attributes, ofAttributes) != h.payload(key.chunk).attributeHash))
+        return damaged("a chunk");
+    STIPPLE_ASSIGN(lod::Chunk decoded, lod::decodeStored(h, key.chunk, bytes.data(), place.bytes, where, false));
+    if (source->finish.apply) STIPPLE_TRY(source->finish.apply(key.chunk, decoded, attributes, ofAttributes));
+    if (const lod::Stream* stream = weightsPlace()) {
+        if (hashBytes(weights.data(), weights.size()) != stream->hash) return damaged("the weights of a chunk");
+        STIPPLE_ASSIGN(decoded.weights,
+                       lod::decodeWeights(weights.data(), weights.size(), h.payload(key.chunk).records, where));
+    }
+    return decoded;
+}
 
 bool isLegalTransition(ChunkState from, ChunkState to) {
     static const std::array<std::pair<ChunkState, ChunkState>, 8> legal{
@@ -101,11 +97,7 @@ bool isLegalTransition(ChunkState from, ChunkState to) {
 }
 
 Streamer::Streamer(Executor& executor, ChunkSink& sink, StreamSettings settings)
-    : executor_(executor),
-      executorLife_(executor.life()),
-      sink_(sink),
-      settings_(settings),
-      completed_(std::make_shared<CompletionQueue<Arrival>>()) {
+    : executor_(executor), executorLife_(executor.life()), sink_(sink), settings_(settings) {
     ends_.before = ends_.after = {kNoSource, 0};
 }
 
@@ -118,8 +110,7 @@ Streamer::~Streamer() {
 
 void Streamer::addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
                          ChunkFinish finish) {
-    sources_.push_back({&hierarchy, std::move(source), std::move(name),
-                        std::make_shared<const ChunkFinish>(std::move(finish)),
+    sources_.push_back({&hierarchy, std::move(source), std::move(name), std::move(finish),
                         std::vector<ChunkLife>(hierarchy.chunks())});
     drawable_.emplace_back(hierarchy.chunks(), uint8_t{0});
     const auto index = static_cast<uint32_t>(sources_.size() - 1);
@@ -136,76 +127,86 @@ void Streamer::setState(ChunkKey key, ChunkState to) {
     drawable_[key.source][key.chunk] = to == ChunkState::resident ? 1 : 0;
 }
 
+void Streamer::giveBack(Request& request) {
+    request.chunk = lod::Chunk{};
+    spare_.push_back(&request);
+}
+
 void Streamer::collect() {
-    for (Arrival& arrival : completed_->takeAll()) {
+    completed_.takeAll(taken_);
+    for (Request* const request : taken_) {
         --counters_.inFlight;
-        if (!arrival.chunk) {
-            setState(arrival.key, ChunkState::failed);
-            sources_[arrival.key.source].chunks[arrival.key.chunk].retryAt = frame_ + kRetryFrames;
+        const ChunkKey key = request->key;
+        if (!request->chunk) {
+            setState(key, ChunkState::failed);
+            lifeOf(key).retryAt = frame_ + kRetryFrames;
             ++counters_.failures;
-            lastFailure_ = arrival.chunk.error().line();
+            lastFailure_ = request->chunk.error().line();
+            giveBack(*request);
             continue;
         }
-        setState(arrival.key, ChunkState::arrived);
-        counters_.bytesStreamed += lod::chunkPlace(*sources_[arrival.key.source].hierarchy, arrival.key.chunk).bytes;
-        arrived_.push_back(std::move(arrival));
+        setState(key, ChunkState::arrived);
+        counters_.bytesStreamed += lod::chunkPlace(*request->source->hierarchy, key.chunk).bytes;
+        arrived_.push_back(request);
     }
 }
 
 void Streamer::upload() {
     uint64_t uploaded = 0;
     // What others build on has the lower number.
-    std::sort(arrived_.begin(), arrived_.end(), [](const Arrival& a, const Arrival& b) {
-        return a.key.chunk != b.key.chunk ? a.key.chunk < b.key.chunk : a.key.source < b.key.source;
+    std::sort(arrived_.begin(), arrived_.end(), [](const Request* a, const Request* b) {
+        return a->key.chunk != b->key.chunk ? a->key.chunk < b->key.chunk : a->key.source < b->key.source;
     });
-    std::vector<Arrival> later;
-    size_t taken = 0;
-    for (; taken < arrived_.size(); ++taken) {
-        Arrival& arrival = arrived_[taken];
-        if (lifeOf(arrival.key).lastWanted < frame_) {
-            setState(arrival.key, ChunkState::absent);
-            ++counters_.unwanted;
-            continue;
-        }
-        bool isWhole = true, isUnderWay = true;
-        lod::forEachRequired(*sources_[arrival.key.source].hierarchy, arrival.key.chunk, [&](uint32_t above) {
-            const ChunkState base = sources_[arrival.key.source].chunks[above].state;
-            isWhole = isWhole && base == ChunkState::resident;
-            isUnderWay = isUnderWay && base != ChunkState::absent && base != ChunkState::failed;
-        });
-        if (!isWhole && isUnderWay) {
-            later.push_back(std::move(arrival));
-            continue;
-        }
-        if (!isWhole) {
-            setState(arrival.key, ChunkState::absent);
-            ++counters_.unwanted;
-            continue;
-        }
-        const uint64_t bytes = lod::decodedBytes(*sources_[arrival.key.source].hierarchy, arrival.key.chunk);
-        if (uploaded > 0 && uploaded + bytes > settings_.uploadBytesPerFrame) break;
-        if (!makeRoom(bytes)) {
-            setState(arrival.key, ChunkState::absent);
-            sources_[arrival.key.source].chunks[arrival.key.chunk].retryAt = frame_ + kRetryFrames;
-            ++counters_.refused;
-            continue;
-        }
-        if (const auto result = sink_.upload(arrival.key, std::move(*arrival.chunk)); !result) {
-            setState(arrival.key, ChunkState::failed);
-            sources_[arrival.key.source].chunks[arrival.key.chunk].retryAt = frame_ + kRetryFrames;
-            ++counters_.failures;
-            lastFailure_ = result.error().line();
-            continue;
-        }
-        setState(arrival.key, ChunkState::resident);
-        countInParents(arrival.key, 1);
-        use(arrival.key);
-        counters_.residentBytes += bytes;
-        ++counters_.uploads;
-        uploaded += bytes;
+    size_t waiting = 0;
+    bool isFull = false;
+    for (Request* const request : arrived_) {
+        const Fate fate = isFull ? Fate::waits : settle(*request, uploaded);
+        isFull = isFull || fate == Fate::frameIsFull;
+        if (fate == Fate::settled)
+            giveBack(*request);
+        else
+            arrived_[waiting++] = request;
     }
-    for (; taken < arrived_.size(); ++taken) later.push_back(std::move(arrived_[taken]));
-    arrived_ = std::move(later);
+    arrived_.resize(waiting);
+}
+
+Streamer::Fate Streamer::settle(Request& request, uint64_t& uploaded) {
+    const ChunkKey key = request.key;
+    const Source& source = sources_[key.source];
+    ChunkLife& life = lifeOf(key);
+    const auto drop = [&](uint64_t& counter) {
+        setState(key, ChunkState::absent);
+        ++counter;
+        return Fate::settled;
+    };
+    if (life.lastWanted < frame_) return drop(counters_.unwanted);
+    bool isWhole = true, isUnderWay = true;
+    lod::forEachRequired(*source.hierarchy, key.chunk, [&](uint32_t above) {
+        const ChunkState base = source.chunks[above].state;
+        isWhole = isWhole && base == ChunkState::resident;
+        isUnderWay = isUnderWay && base != ChunkState::absent && base != ChunkState::failed;
+    });
+    if (!isWhole) return isUnderWay ? Fate::waits : drop(counters_.unwanted);
+    const uint64_t bytes = lod::decodedBytes(*source.hierarchy, key.chunk);
+    if (uploaded > 0 && uploaded + bytes > settings_.uploadBytesPerFrame) return Fate::frameIsFull;
+    if (!makeRoom(bytes)) {
+        life.retryAt = frame_ + kRetryFrames;
+        return drop(counters_.refused);
+    }
+    if (const auto result = sink_.upload(key, std::move(*request.chunk)); !result) {
+        setState(key, ChunkState::failed);
+        life.retryAt = frame_ + kRetryFrames;
+        ++counters_.failures;
+        lastFailure_ = result.error().line();
+        return Fate::settled;
+    }
+    setState(key, ChunkState::resident);
+    countInParents(key, 1);
+    use(key);
+    counters_.residentBytes += bytes;
+    ++counters_.uploads;
+    uploaded += bytes;
+    return Fate::settled;
 }
 
 bool Streamer::isEvictable(ChunkKey key) const {
@@ -307,43 +308,49 @@ void Streamer::start(uint32_t sourceIndex, uint32_t chunk) {
     setState(key, ChunkState::requested);
     ++counters_.inFlight;
     ++counters_.requests;
-    const std::string where = fmt::format("{}: chunk {}", source.name, chunk);
-    auto asked = std::make_shared<const Asked>(Asked{source.bytes, source.hierarchy, source.finish, key, where});
-    executor_.read([asked = std::move(asked), queue = completed_, &executor = executor_] {
-        auto stored = std::make_shared<Result<Stored>>(orFail([&] { return readStored(*asked); }));
-        executor.run([asked, stored, queue] {
-            if (!*stored)
-                queue->push({asked->key, tl::unexpected((*stored).error())});
-            else
-                queue->push({asked->key, orFail([&] { return decode(*asked, **stored); })});
+    if (spare_.empty()) spare_.push_back(requests_.emplace_back(std::make_unique<Request>()).get());
+    Request* const request = spare_.back();
+    spare_.pop_back();
+    request->key = key;
+    request->source = &source;
+    // Two pointers are what a task holds without memory of its own. The streamer waits for its tasks before it ends.
+    executor_.read([this, request] {
+        if (auto read = orFail([&] { return request->read(); }); !read)
+            request->chunk = tl::unexpected(std::move(read.error()));
+        executor_.run([this, request] {
+            if (request->chunk) request->chunk = orFail([&] { return request->decode(); });
+            request->bytes = {};
+            request->weights = {};
+            completed_.push(request);
         });
     });
 }
 
 void Streamer::makeRoomFor(const lod::ResidentPlan& plan) {
     const auto isPlanned = [&](ChunkKey key) { return plan.chunks[key.source][key.chunk] != 0; };
-    std::erase_if(arrived_, [&](const Arrival& a) {
-        if (isPlanned(a.key)) return false;
-        setState(a.key, ChunkState::absent);
+    std::erase_if(arrived_, [&](Request* request) {
+        if (isPlanned(request->key)) return false;
+        setState(request->key, ChunkState::absent);
+        giveBack(*request);
         return true;
     });
-    std::vector<ChunkKey> others;
+    others_.clear();
     uint64_t together = plan.bytes;
     for (uint32_t s = 0; s < sources_.size(); ++s)
         for (uint32_t n = 0; n < sources_[s].chunks.size(); ++n) {
             ChunkLife& state = sources_[s].chunks[n];
             if (isPlanned({s, n})) state.retryAt = 0;  // there was no room; now there is
             if (state.state != ChunkState::resident || isPlanned({s, n})) continue;
-            others.push_back({s, n});
+            others_.push_back({s, n});
             together += lod::decodedBytes(*sources_[s].hierarchy, n);
         }
     const auto last = [&](ChunkKey k) { return sources_[k.source].chunks[k.chunk].lastUsed; };
     // What builds on others was not used later than they, and has the higher number.
-    std::sort(others.begin(), others.end(), [&](ChunkKey a, ChunkKey b) {
+    std::sort(others_.begin(), others_.end(), [&](ChunkKey a, ChunkKey b) {
         if (last(a) != last(b)) return last(a) < last(b);
         return a.source != b.source ? a.source < b.source : a.chunk > b.chunk;
     });
-    for (const ChunkKey key : others) {
+    for (const ChunkKey key : others_) {
         if (plan.isComplete() && together <= settings_.residentBytes) break;
         together -= lod::decodedBytes(*sources_[key.source].hierarchy, key.chunk);
         evict(key);

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -107,16 +108,20 @@ class Streamer {
         const lod::Hierarchy* hierarchy;
         std::shared_ptr<const ByteSource> bytes;
         std::string name;
-        std::shared_ptr<const ChunkFinish> finish;
+        ChunkFinish finish;
         std::vector<ChunkLife> chunks;
     };
-    struct Arrival {
-        ChunkKey key;
-        Result<lod::Chunk> chunk;
-    };
+    /// A chunk on its way, from start() until it is uploaded or dropped.
+    struct Request;
     void setState(ChunkKey key, ChunkState to);
     bool makeRoom(uint64_t bytes);
     void start(uint32_t source, uint32_t chunk);
+    /// What upload() makes of one that arrived: it is resident or dropped, it waits for what it builds on, or it and
+    /// all after it wait for the next frame, as this one has uploaded what it may.
+    enum class Fate : uint8_t { settled, waits, frameIsFull };
+    Fate settle(Request& request, uint64_t& uploaded);
+    /// It has no chunk any more, and stands for another.
+    void giveBack(Request& request);
     void evict(ChunkKey key);
     void countInParents(ChunkKey key, int change);
     ChunkLife& lifeOf(ChunkKey key) { return key.source == kNoSource ? ends_ : sources_[key.source].chunks[key.chunk]; }
@@ -134,12 +139,15 @@ class Streamer {
     ChunkSink& sink_;
     StreamSettings settings_;
     static constexpr uint32_t kNoSource = 0xffffffffu;
-    std::vector<Source> sources_;
-    ChunkLife ends_;  ///< of the list: after it comes its first, before it its last
+    std::deque<Source> sources_;  ///< tasks look at them, wherever others are added
+    ChunkLife ends_;              ///< of the list: after it comes its first, before it its last
     std::vector<std::vector<uint8_t>> drawable_;
-    std::shared_ptr<CompletionQueue<Arrival>> completed_;
-    std::vector<Arrival> arrived_;
+    // What a frame needs while chunks come and go is used again, so that its thread allocates nothing once warm.
+    std::vector<std::unique_ptr<Request>> requests_;
+    std::vector<Request*> spare_, arrived_, taken_;
+    CompletionQueue<Request*> completed_;
     std::vector<lod::CutWanted> wanted_;
+    std::vector<ChunkKey> others_;
     StreamCounters counters_;
     uint64_t frame_ = 0;
     std::string lastFailure_;

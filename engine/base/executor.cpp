@@ -8,7 +8,6 @@
 
 #include <atomic>
 #include <condition_variable>
-#include <deque>
 #include <mutex>
 #include <system_error>
 #include <thread>
@@ -49,6 +48,32 @@ class ThreadExecutor final : public Executor {
 };
 #endif
 
+/// First in, first out, in memory that is kept: whoever starts tasks frame by frame allocates nothing.
+class Tasks {
+  public:
+    bool isEmpty() const { return next_ == tasks_.size(); }
+    size_t size() const { return tasks_.size() - next_; }
+    void push(std::function<void()> task) {
+        if (next_ > 0 && tasks_.size() == tasks_.capacity()) {
+            tasks_.erase(tasks_.begin(), tasks_.begin() + static_cast<std::ptrdiff_t>(next_));
+            next_ = 0;
+        }
+        tasks_.push_back(std::move(task));
+    }
+    std::function<void()> take() {
+        std::function<void()> task = std::exchange(tasks_[next_++], nullptr);
+        if (isEmpty()) {
+            tasks_.clear();
+            next_ = 0;
+        }
+        return task;
+    }
+
+  private:
+    std::vector<std::function<void()>> tasks_;
+    size_t next_ = 0;  ///< those before it were taken
+};
+
 /// Takes tasks that the threads of an arena should not: those of read(), and those of run() where the arena has one
 /// thread, which may be waiting for what they give. Threads come as tasks do, `most` of them.
 class SideThreads {
@@ -65,7 +90,7 @@ class SideThreads {
     void run(std::function<void()> task) {
         {
             const std::lock_guard lock(mutex_);
-            tasks_.push_back(std::move(task));
+            tasks_.push(std::move(task));
             if (threads_.size() < most_ && busy_ + tasks_.size() > threads_.size()) try {
                     threads_.emplace_back([this] { work(); });
                 } catch (const std::system_error&) {  // none more are to be had
@@ -74,24 +99,22 @@ class SideThreads {
                 changed_.notify_all();
                 return;
             }
-            task = std::move(tasks_.front());
-            tasks_.pop_front();
+            task = tasks_.take();
         }
         task();  // here and now, then
     }
     void wait() {
         std::unique_lock lock(mutex_);
-        changed_.wait(lock, [&] { return tasks_.empty() && busy_ == 0; });
+        changed_.wait(lock, [&] { return tasks_.isEmpty() && busy_ == 0; });
     }
 
   private:
     void work() {
         std::unique_lock lock(mutex_);
         for (;;) {
-            changed_.wait(lock, [&] { return isOver_ || !tasks_.empty(); });
-            if (tasks_.empty()) return;
-            std::function<void()> task = std::move(tasks_.front());
-            tasks_.pop_front();
+            changed_.wait(lock, [&] { return isOver_ || !tasks_.isEmpty(); });
+            if (tasks_.isEmpty()) return;
+            std::function<void()> task = tasks_.take();
             ++busy_;
             lock.unlock();
             task();
@@ -104,7 +127,7 @@ class SideThreads {
     const size_t most_;
     std::mutex mutex_;
     std::condition_variable changed_;
-    std::deque<std::function<void()>> tasks_;
+    Tasks tasks_;
     size_t busy_ = 0;
     bool isOver_ = false;
     std::vector<std::thread> threads_;
@@ -166,18 +189,14 @@ class SerialExecutor final : public Executor {
         const size_t step = grain ? grain : 1;
         for (size_t i = 0; i < count; i += step) body(i, i + step < count ? i + step : count);
     }
-    void run(std::function<void()> task) override { tasks_.push_back(std::move(task)); }
+    void run(std::function<void()> task) override { tasks_.push(std::move(task)); }
     void wait() override {
-        while (!tasks_.empty()) {
-            auto task = std::move(tasks_.front());
-            tasks_.pop_front();
-            task();
-        }
+        while (!tasks_.isEmpty()) tasks_.take()();
     }
     int threads() const override { return 1; }
 
   private:
-    std::deque<std::function<void()>> tasks_;
+    Tasks tasks_;
 };
 
 }  // namespace

@@ -19,6 +19,12 @@ class CompletionQueue {
         const std::lock_guard lock(mutex_);
         return std::exchange(items_, {});
     }
+    /// The same into `items`, whose memory is used for what comes next.
+    void takeAll(std::vector<T>& items) {
+        items.clear();
+        const std::lock_guard lock(mutex_);
+        std::swap(items, items_);
+    }
 
   private:
     std::mutex mutex_;

@@ -21,9 +21,25 @@ namespace stipple::cpu {
 struct Chunks {
     std::unordered_map<uint64_t, lod::Chunk> chunks;
     std::vector<std::vector<const uint32_t*>> tiles;
+    std::vector<std::unordered_map<uint64_t, lod::Chunk>::node_type> spare;
 
     static uint64_t idOf(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.chunk; }
     const lod::Chunk& at(streaming::ChunkKey key) const { return chunks.at(idOf(key)); }
+    /// The table's own memory is used again, so that chunks that come and go allocate nothing once warm.
+    const lod::Chunk& keep(streaming::ChunkKey key, lod::Chunk chunk) {
+        if (spare.empty() || chunks.contains(idOf(key))) return chunks[idOf(key)] = std::move(chunk);
+        auto entry = std::move(spare.back());
+        spare.pop_back();
+        entry.key() = idOf(key);
+        entry.mapped() = std::move(chunk);
+        return chunks.insert(std::move(entry)).position->second;
+    }
+    void drop(streaming::ChunkKey key) {
+        if (auto entry = chunks.extract(idOf(key))) {
+            entry.mapped() = {};
+            spare.push_back(std::move(entry));
+        }
+    }
 };
 
 /// The tiles that a disc reaches.

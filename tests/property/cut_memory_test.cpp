@@ -1,5 +1,5 @@
 // A cut allocates nothing once its scratch is warm, with instance groups and budgets too, and what it asks on the way
-// about costs leaves no trace in what it reports.
+// about costs leaves no trace in what it reports. Nor does the thread of frames while chunks come and go.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -16,10 +16,12 @@
 
 namespace {
 std::atomic<uint64_t> allocations{0};
-}
+thread_local uint64_t ownAllocations = 0;  // of this thread
+}  // namespace
 
 void* operator new(size_t bytes) {
     ++allocations;
+    ++ownAllocations;
     if (void* p = std::malloc(bytes)) return p;
     throw std::bad_alloc();
 }
@@ -122,6 +124,58 @@ TEST(CutMemory, NothingIsAllocatedOnceWarmWithInstanceGroups) {
     EXPECT_GT(laps.bound, 40u);
     EXPECT_GT(laps.partly, 40u);
     EXPECT_GT(laps.mixed, 40u);
+}
+
+/// What the thread of frames allocates up to the request, of a camera that flies round a ball of points `laps` times;
+/// memory holds a part of what it sees. Tasks that read and decode are other threads', or run between frames.
+struct Flight {
+    std::vector<uint64_t> allocated, uploads, evictions;  ///< of each lap
+};
+Flight flyStreamed(Executor& executor, const std::shared_ptr<const lod::Store>& store, size_t laps) {
+    const auto backend = cpu::makeCpuBackend(executor);
+    streaming::StreamSettings settings;
+    settings.residentBytes = 1'100'000;
+    settings.uploadBytesPerFrame = 100'000;
+    settings.requestsInFlight = 16;
+    const auto state = render::makeFrameState({store}, *backend, executor, settings);
+    const lod::Hierarchy& h = store->hierarchy;
+    const std::vector<lod::View> views = viewsOf(h.origin + h.unit * h.nodes[0].centre, 1.5);
+    Flight flight;
+    streaming::Streamer& streamer = *state->streamer;
+    for (size_t lap = 0; lap < laps; ++lap) {
+        const streaming::StreamCounters before = streamer.counters();
+        uint64_t allocated = 0;
+        for (const lod::View& view : views)
+            for (int stay = 0; stay < 3; ++stay) {
+                const uint64_t start = ownAllocations;
+                streamer.collect();
+                streamer.upload();
+                lod::selectCut(state->scene(), streamer.residency(), view, {1, kNoLimit}, state->scratch, state->cut);
+                streamer.request(state->cut);
+                allocated += ownAllocations - start;
+                streamer.wait();
+            }
+        flight.allocated.push_back(allocated);
+        flight.uploads.push_back(streamer.counters().uploads - before.uploads);
+        flight.evictions.push_back(streamer.counters().evictions - before.evictions);
+    }
+    return flight;
+}
+
+TEST(CutMemory, FramesThatStreamAllocateNothingOnceWarm) {
+    const test::TempFolder folder;
+    const auto several = makeTbbExecutor(2), one = makeTbbExecutor(1), serial = makeSerialExecutor();
+    test::writePly(folder / "a.ply", test::bumpySphere(60'000, 1));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *several);
+    for (Executor* const executor : {serial.get(), one.get(), several.get()}) {
+        const Flight flight = flyStreamed(*executor, store, 5);
+        EXPECT_GT(flight.allocated.front(), 0u) << "the count must see what cold frames take";
+        for (size_t lap = 3; lap < 5; ++lap) {
+            EXPECT_EQ(flight.allocated[lap], 0u) << flight.uploads[lap] << " chunks came";
+            EXPECT_GT(flight.uploads[lap], 40u);
+            EXPECT_GT(flight.evictions[lap], 40u);
+        }
+    }
 }
 
 // What a cut reports to have visited is what it went through to draw, not what it compared that with.
