@@ -1,4 +1,4 @@
-// Reading forward through a file in blocks, with a look ahead.
+// Reading forward through bytes in blocks, with a look ahead.
 #pragma once
 
 #include <algorithm>
@@ -6,13 +6,13 @@
 #include <memory>
 #include <vector>
 
-#include "engine/base/file.h"
+#include "engine/base/byte_source.h"
 
 namespace stipple {
 
 class Cursor {
   public:
-    Cursor(std::shared_ptr<const InputFile> file, uint64_t offset, size_t blockBytes = size_t{4} << 20)
+    Cursor(std::shared_ptr<const ByteSource> file, uint64_t offset, size_t blockBytes = size_t{4} << 20)
         : file_(std::move(file)), end_(file_->sizeBytes()), offset_(offset), blockBytes_(blockBytes) {}
     /// Over bytes that are at hand.
     explicit Cursor(std::vector<uint8_t> bytes)
@@ -54,7 +54,7 @@ class Cursor {
     }
 
   private:
-    std::shared_ptr<const InputFile> file_;
+    std::shared_ptr<const ByteSource> file_;
     uint64_t end_, offset_;
     size_t blockBytes_ = 0, used_ = 0;
     std::vector<uint8_t> buffer_;

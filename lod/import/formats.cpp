@@ -13,12 +13,6 @@
 namespace stipple::lod {
 namespace {
 
-Result<PointSource> lasPoints(const std::string& path, const ReadOptions& options, const FormatOptions&) {
-    return openLas(path, options);
-}
-Result<PointSource> plyPoints(const std::string& path, const ReadOptions& options, const FormatOptions&) {
-    return openPly(path, options);
-}
 Result<bool> plyHasMesh(const std::string& path, const FormatOptions& more) {
     if (more.onlyPoints) return false;
     STIPPLE_ASSIGN(const PlyFaces faces, plyFaces(path));
@@ -34,11 +28,11 @@ Result<OpenedMesh> plyMesh(const std::string& path, const FormatOptions& more) {
 /// In the order in which messages name them.
 const std::vector<Format>& table() {
     static const std::vector<Format> kFormats{
-        {.name = "LAS", .endings = {".las", ".laz"}, .marks = {"LASF"}, .openPoints = lasPoints},
+        {.name = "LAS", .endings = {".las", ".laz"}, .marks = {"LASF"}, .readPoints = openLas},
         {.name = "PLY",
          .endings = {".ply"},
          .marks = {"ply"},
-         .openPoints = plyPoints,
+         .readPoints = openPly,
          .hasMesh = plyHasMesh,
          .openMesh = plyMesh},
         {.name = "OpenVDB",
@@ -54,17 +48,14 @@ const std::vector<Format>& table() {
     return kFormats;
 }
 
-const Format* formatOfHead(const std::string& path) {
+/// What a file begins with; nothing of what is none.
+std::string headOf(const std::string& path) {
     std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) return nullptr;
+    if (!std::filesystem::is_regular_file(path, error)) return {};
     const auto file = InputFile::open(path);
     std::array<char, 8> head{};
-    if (!file || !file->readAt(0, head.data(), std::min<uint64_t>(head.size(), file->sizeBytes()))) return nullptr;
-    const std::string_view text(head.data(), head.size());
-    for (const Format& format : table())
-        for (const std::string_view mark : format.marks)
-            if (text.starts_with(mark)) return &format;
-    return nullptr;
+    if (!file || !file->readAt(0, head.data(), std::min<uint64_t>(head.size(), file->sizeBytes()))) return {};
+    return std::string(head.data(), head.size());
 }
 
 }  // namespace
@@ -79,9 +70,13 @@ const Format* formatNamed(const std::string& path) {
     return nullptr;
 }
 
-const Format* formatOf(const std::string& path) {
-    const Format* const known = formatOfHead(path);
-    return known ? known : formatNamed(path);
+const Format* formatOf(const std::string& path) { return formatOf(path, headOf(path)); }
+
+const Format* formatOf(const std::string& path, std::string_view head) {
+    for (const Format& format : table())
+        for (const std::string_view mark : format.marks)
+            if (head.starts_with(mark)) return &format;
+    return formatNamed(path);
 }
 
 std::string allEndings(const std::string& last) {

@@ -2,6 +2,8 @@
 // folder of its own and one row of it (README.md).
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,10 +11,17 @@
 #include <variant>
 #include <vector>
 
+#include "engine/base/byte_source.h"
 #include "lod/primitives/mesh_source.h"
 #include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
+
+/// Gives a reader its bytes, each time that it begins to read. A file is closed in between: thousands of sources may
+/// be open at once.
+using OpenBytes = std::function<Result<std::shared_ptr<const ByteSource>>()>;
+OpenBytes fromFile(const std::string& path);
+OpenBytes fromBytes(std::shared_ptr<const ByteSource> bytes);
 
 /// What a reader or writer may want to know beside ReadOptions.
 struct FormatOptions {
@@ -49,7 +58,10 @@ struct Format {
     std::string_view name;
     std::vector<std::string_view> endings;  ///< ".ply"; the first names the format in messages
     std::vector<std::string_view> marks;    ///< what a file begins with, 8 bytes at most
-    Result<PointSource> (*openPoints)(const std::string& path, const ReadOptions& options, const FormatOptions& more);
+    Result<PointSource> (*readPoints)(const OpenBytes& open, const ReadOptions& options) = nullptr;
+    /// Of formats that are read from a file only.
+    Result<PointSource> (*openPoints)(const std::string& path, const ReadOptions& options,
+                                      const FormatOptions& more) = nullptr;
     /// Are there triangles that are wanted? Null: never.
     Result<bool> (*hasMesh)(const std::string& path, const FormatOptions& more) = nullptr;
     Result<OpenedMesh> (*openMesh)(const std::string& path, const FormatOptions& more) = nullptr;
@@ -67,6 +79,8 @@ struct Format {
 std::span<const Format> formats();
 /// By what the file begins with, then by its ending; null: none of them.
 const Format* formatOf(const std::string& path);
+/// `head`: its first 8 bytes.
+const Format* formatOf(const std::string& path, std::string_view head);
 /// By the ending of a name, whether the file is there or not.
 const Format* formatNamed(const std::string& path);
 /// ".las, .laz, .ply": of all formats; `last`: " or ", before the last.

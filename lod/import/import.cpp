@@ -148,18 +148,42 @@ Result<uint64_t> readPoints(const PointSource& source, const std::function<Resul
     return points;
 }
 
+OpenBytes fromFile(const std::string& path) {
+    return [path]() -> Result<std::shared_ptr<const ByteSource>> {
+        STIPPLE_ASSIGN(InputFile file, InputFile::open(path));
+        return std::make_shared<const InputFile>(std::move(file));
+    };
+}
+
+OpenBytes fromBytes(std::shared_ptr<const ByteSource> bytes) {
+    return [bytes = std::move(bytes)] { return Result<std::shared_ptr<const ByteSource>>(bytes); };
+}
+
 Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options, const FormatOptions& more) {
     std::error_code ignored;
     if (fs::is_directory(path, ignored))
         return fail(ErrorKind::input, "is a directory", path, "name the files in it, e.g. " + path + "/*.las");
-    std::array<char, 2> head{};
+    const Format* const format = formatOf(path);
+    if (format != nullptr && format->openPoints != nullptr && fs::file_size(path, ignored) > 0)
+        return format->openPoints(path, options, more);
+    return openPointSource(fromFile(path), options);
+}
+
+Result<PointSource> openPointSource(const OpenBytes& open, const ReadOptions& options) {
+    std::array<char, 8> head{};
+    std::string path;
     {
-        STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
-        if (file.sizeBytes() == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
-        if (file.sizeBytes() >= head.size()) STIPPLE_TRY(file.readAt(0, head.data(), head.size()));
+        STIPPLE_ASSIGN(const std::shared_ptr<const ByteSource> bytes, open());
+        path = bytes->path();
+        if (bytes->sizeBytes() == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
+        STIPPLE_TRY(bytes->readAt(0, head.data(), std::min<uint64_t>(head.size(), bytes->sizeBytes())));
     }
-    if (const Format* const format = formatOf(path)) return format->openPoints(path, options, more);
-    if (std::string_view(head.data(), head.size()) == "\x1f\x8b")
+    const std::string_view text(head.data(), head.size());
+    const Format* const format = formatOf(path, text);
+    if (format != nullptr && format->readPoints != nullptr) return format->readPoints(open, options);
+    if (format != nullptr)
+        return fail(ErrorKind::input, fmt::format("is {}, which is read from files only", format->name), path);
+    if (text.starts_with("\x1f\x8b"))
         return fail(ErrorKind::input, "is compressed with gzip", path, "unpack it first: gunzip -k");
     const std::string reads = "it reads " + allEndings() + ", .gltf, .glb, .obj, .swc, .trk, .hair and cylinder models";
     if (isOtherPointFormat(lowerExtension(path)))

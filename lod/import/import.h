@@ -1,6 +1,8 @@
 // Readers: one file or folder per format, each a function that reads a header and returns a PointSource.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,16 +12,19 @@
 
 namespace stipple::lod {
 
-/// By content, then by extension, of the formats in the table (formats.h). Errors say which there are. The file is
-/// closed again: thousands of sources may be open at once.
+/// By content, then by extension, of the formats in the table (formats.h). Errors say which there are.
+Result<PointSource> openPointSource(const OpenBytes& open, const ReadOptions& options = {});
+/// Formats that are read from a file only, too.
 Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options = {},
                                     const FormatOptions& more = {});
 
 /// PLY: ascii, binary little and big endian; any property order and type; elements before `vertex` and lists are
 /// skipped.
+Result<PointSource> openPly(const OpenBytes& open, const ReadOptions& options = {});
 Result<PointSource> openPly(const std::string& path, const ReadOptions& options = {});
 
 /// LAS 1.0 to 1.5 and LAZ (pointwise, chunked, layered), point formats 0 to 10.
+Result<PointSource> openLas(const OpenBytes& open, const ReadOptions& options = {});
 Result<PointSource> openLas(const std::string& path, const ReadOptions& options = {});
 
 /// Every point of a source in file order, on this thread; `take` is called with each block. Returns their number.

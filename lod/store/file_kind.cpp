@@ -13,9 +13,12 @@ FileKind fileKindOf(const std::string& path) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) return FileKind::other;
     const auto file = InputFile::open(path);
-    if (!file) return FileKind::other;
+    return file ? fileKindOf(*file) : FileKind::other;
+}
+
+FileKind fileKindOf(const ByteSource& bytes) {
     std::array<char, 8> head{};
-    if (!file->readAt(0, head.data(), std::min<uint64_t>(head.size(), file->sizeBytes()))) return FileKind::other;
+    if (!bytes.readAt(0, head.data(), std::min<uint64_t>(head.size(), bytes.sizeBytes()))) return FileKind::other;
     constexpr std::array<std::pair<std::string_view, FileKind>, 7> kMarks{{{"STIPPLE1", FileKind::store},
                                                                            {"LASF", FileKind::las},
                                                                            {"ply\n", FileKind::ply},

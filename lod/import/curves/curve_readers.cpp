@@ -10,8 +10,7 @@ namespace stipple::lod {
 namespace {
 
 /// By the bytes, where the format has a mark of its own; empty: they are of another kind than curves.
-std::string extensionOf(const std::string& path) {
-    const FileKind kind = fileKindOf(path);
+std::string extensionOf(const std::string& path, FileKind kind) {
     if (kind == FileKind::trk) return ".trk";
     if (kind == FileKind::hair) return ".hair";
     if (kind != FileKind::other) return "";
@@ -23,17 +22,23 @@ std::string extensionOf(const std::string& path) {
 }  // namespace
 
 bool isCurveFile(const std::string& path) {
-    const std::string e = extensionOf(path);
+    const std::string e = extensionOf(path, fileKindOf(path));
     return e == ".swc" || e == ".trk" || e == ".hair" || e == ".txt" || e == ".csv";
 }
 
 Result<CurveSource> openCurves(const std::string& path) {
     STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
-    const auto file = std::make_shared<const InputFile>(std::move(opened));
+    STIPPLE_ASSIGN(CurveSource source, openCurves(std::make_shared<const InputFile>(std::move(opened))));
+    source.identity = [path] { return fileIdentity(path); };  // what was read as a whole is closed again
+    return source;
+}
+
+Result<CurveSource> openCurves(const std::shared_ptr<const ByteSource>& file) {
+    const std::string path = file->path();
     CurveSource source;
     source.vertices = file->sizeBytes() / 12;
-    source.identity = [path] { return fileIdentity(path); };
-    const std::string e = extensionOf(path);
+    source.identity = [file] { return file->identity(); };
+    const std::string e = extensionOf(path, fileKindOf(*file));
     source.isPlant = e != ".swc" && e != ".trk" && e != ".hair";  // of cylinder models trees are made
     if (e == ".trk") {
         source.read = [file, path](const CurveSource::Take& take) { return readTrk(Cursor(file, 0), path, take); };

@@ -15,6 +15,7 @@ namespace stipple::lod {
 bool isCurveFile(const std::string& path);
 /// TrackVis and hair files are read block by block; the others, small by nature, as a whole.
 Result<CurveSource> openCurves(const std::string& path);
+Result<CurveSource> openCurves(const std::shared_ptr<const ByteSource>& file);
 
 // By format; `path` names the file in messages.
 /// SWC neurons: one tube per unbranched section, coloured by the kind of section.

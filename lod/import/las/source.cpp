@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "engine/base/file.h"
+#include "engine/base/byte_source.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
 
@@ -13,7 +13,7 @@ namespace {
 constexpr size_t kBlockBytes = size_t{4} << 20;         ///< of records held at once by one reader
 constexpr uint64_t kLasPartPoints = uint64_t{1} << 20;  ///< uncompressed files: what one reader takes
 
-las::Bytes bytesOf(const InputFile& file) {
+las::Bytes bytesOf(const ByteSource& file) {
     return {file.sizeBytes(),
             [&file](uint64_t offset, void* to, size_t count) { return file.readAt(offset, to, count); }};
 }
@@ -67,9 +67,10 @@ void extract(const LasFile& file, const uint8_t* records, size_t count, PointBlo
 /// Reads one part: a run of records, one chunk, or (without a chunk table) all chunks in order.
 class PartReader {
   public:
-    PartReader(std::shared_ptr<const LasFile> file, InputFile input, const las::LazChunk& part, bool endKnown)
+    PartReader(std::shared_ptr<const LasFile> file, std::shared_ptr<const ByteSource> input, const las::LazChunk& part,
+               bool endKnown)
         : file_(std::move(file)),
-          input_(std::make_unique<InputFile>(std::move(input))),
+          input_(std::move(input)),
           bytes_(bytesOf(*input_)),
           part_(part),
           endKnown_(endKnown),
@@ -125,7 +126,7 @@ class PartReader {
     }
 
     std::shared_ptr<const LasFile> file_;
-    std::unique_ptr<InputFile> input_;
+    std::shared_ptr<const ByteSource> input_;
     las::Bytes bytes_;
     las::LazChunk part_;
     bool endKnown_;
@@ -168,8 +169,13 @@ Result<bool> findParts(const las::Bytes& bytes, LasFile& file, bool tolerant) {
 }  // namespace
 
 Result<PointSource> openLas(const std::string& path, const ReadOptions& options) {
-    STIPPLE_ASSIGN(const InputFile input, InputFile::open(path));
-    const las::Bytes bytes = bytesOf(input);
+    return openLas(fromFile(path), options);
+}
+
+Result<PointSource> openLas(const OpenBytes& open, const ReadOptions& options) {
+    STIPPLE_ASSIGN(const std::shared_ptr<const ByteSource> input, open());
+    const std::string& path = input->path();
+    const las::Bytes bytes = bytesOf(*input);
     auto file = std::make_shared<LasFile>();
     STIPPLE_ASSIGN(file->header, las::readLasHeader(bytes, path, options.skipBad));
     las::LasHeader& h = file->header;
@@ -207,8 +213,8 @@ Result<PointSource> openLas(const std::string& path, const ReadOptions& options)
     for (const las::Field& f : h.fields) info.attributes.push_back(f.info);
     for (const las::LazChunk& c : file->chunks) source.parts.push_back(c.count);
     const std::shared_ptr<const LasFile> shared = file;
-    source.openPart = [shared, endKnown](size_t part) -> Result<PointReader> {
-        STIPPLE_ASSIGN(InputFile opened, InputFile::open(shared->header.path));
+    source.openPart = [open, shared, endKnown](size_t part) -> Result<PointReader> {
+        STIPPLE_ASSIGN(std::shared_ptr<const ByteSource> opened, open());
         auto reader = std::make_shared<PartReader>(shared, std::move(opened), shared->chunks.at(part), endKnown);
         return PointReader([reader](PointBlock& block, size_t limit) { return reader->read(block, limit); });
     };

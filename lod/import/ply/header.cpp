@@ -60,7 +60,7 @@ PlyRole parseRole(const std::string& name) {
 
 }  // namespace
 
-Result<PlyHeader> parsePlyHeader(const InputFile& file) {
+Result<PlyHeader> parsePlyHeader(const ByteSource& file) {
     const std::string& path = file.path();
     std::string text(static_cast<size_t>(std::min(file.sizeBytes(), kHeaderLimit)), '\0');
     STIPPLE_TRY(file.readAt(0, text.data(), text.size()));

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/base/file.h"
+#include "engine/base/byte_source.h"
 
 namespace stipple::lod {
 
@@ -46,7 +46,7 @@ struct PlyHeader {
     uint32_t unknownLines = 0;  ///< before the first element; passed over
 };
 
-Result<PlyHeader> parsePlyHeader(const InputFile& file);
+Result<PlyHeader> parsePlyHeader(const ByteSource& file);
 /// Is the list one of corners (faces, strips)?
 inline bool isCornerList(const PlyProperty& p) {
     return p.isList && (p.name == "vertex_indices" || p.name == "vertex_index");

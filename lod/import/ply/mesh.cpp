@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "engine/base/file.h"
 #include "engine/base/numbers.h"
 #include "engine/base/paged_array.h"
 #include "lod/import/import.h"
@@ -135,7 +136,7 @@ class VertexStore {
 
 class PlyMesh {
   public:
-    PlyMesh(std::shared_ptr<const InputFile> file, PlyHeader header, uint64_t memoryBytes, const std::string& folder)
+    PlyMesh(std::shared_ptr<const ByteSource> file, PlyHeader header, uint64_t memoryBytes, const std::string& folder)
         : file_(std::move(file)),
           header_(std::move(header)),
           vertices_(vertexOf(header_), memoryBytes, folder),
@@ -242,7 +243,7 @@ class PlyMesh {
                              [](const PlyElement& e) { return e.name == "vertex"; });
     }
 
-    std::shared_ptr<const InputFile> file_;
+    std::shared_ptr<const ByteSource> file_;
     PlyHeader header_;
     VertexStore vertices_;
     uint64_t count_ = 0, facesAt_ = 0, badFaces_ = 0;
@@ -262,9 +263,13 @@ Result<PlyFaces> plyFaces(const std::string& path) {
 }
 
 Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, const std::string& tempFolder) {
-    STIPPLE_ASSIGN(const PointSource checked, openPly(path, {}));  // the same checks as for points
-    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
-    auto file = std::make_shared<const InputFile>(std::move(opened));
+    STIPPLE_ASSIGN(const std::shared_ptr<const ByteSource> file, fromFile(path)());
+    return openPlyMesh(file, memoryBytes, tempFolder);
+}
+
+Result<MeshSource> openPlyMesh(const std::shared_ptr<const ByteSource>& file, uint64_t memoryBytes,
+                               const std::string& tempFolder) {
+    STIPPLE_ASSIGN(const PointSource checked, openPly(fromBytes(file), {}));  // the same checks as for points
     STIPPLE_ASSIGN(PlyHeader header, parsePlyHeader(*file));
     MeshSource source;
     for (const PlyElement& e : header.elements)
@@ -278,7 +283,7 @@ Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, co
     auto mesh = std::make_shared<PlyMesh>(file, std::move(header), memoryBytes, tempFolder);
     source.surveyBytes = mesh->surveyBytes() > memoryBytes ? mesh->surveyBytes() : 0;
     source.readBytes = source.surveyBytes > 0 ? mesh->readBytes() : 0;
-    source.identity = [path] { return fileIdentity(path); };
+    source.identity = [file] { return file->identity(); };
     source.survey = [mesh, all = source.triangles](const MeshSource::Tell& tell) { return mesh->survey(tell, all); };
     source.read = [mesh](const MeshSource::Take& take) { return mesh->read(take); };
     source.badTriangles = [mesh] { return mesh->badFaces(); };

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "engine/base/byte_source.h"
 #include "engine/base/result.h"
 #include "lod/primitives/mesh_source.h"
 
@@ -21,5 +22,7 @@ Result<PlyFaces> plyFaces(const std::string& path);
 /// a vertex get smooth ones (the sum of the faces', weighted by area). Of the vertices `memoryBytes` are in memory, the
 /// rest in a file in `tempFolder`; faces are read from the file as often as it takes.
 Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, const std::string& tempFolder);
+Result<MeshSource> openPlyMesh(const std::shared_ptr<const ByteSource>& file, uint64_t memoryBytes,
+                               const std::string& tempFolder);
 
 }  // namespace stipple::lod

@@ -28,8 +28,12 @@ void keepWholeMaterials(PlyElement& vertex) {
 }  // namespace
 
 Result<PointSource> openPly(const std::string& path, const ReadOptions& options) {
-    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
-    auto file = std::make_shared<const InputFile>(std::move(opened));
+    return openPly(fromFile(path), options);
+}
+
+Result<PointSource> openPly(const OpenBytes& open, const ReadOptions& options) {
+    STIPPLE_ASSIGN(const std::shared_ptr<const ByteSource> file, open());
+    const std::string& path = file->path();
     STIPPLE_ASSIGN(PlyHeader header, parsePlyHeader(*file));
     auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
                                [](const PlyElement& e) { return e.name == "vertex"; });
@@ -94,9 +98,8 @@ Result<PointSource> openPly(const std::string& path, const ReadOptions& options)
     // Read once, whoever reads first.
     auto scale = std::make_shared<std::optional<double>>();
     auto once = std::make_shared<OneAtATime>();
-    source.openPart = [path, header, wanted, scale, once](size_t) -> Result<PointReader> {
-        STIPPLE_ASSIGN(InputFile reopened, InputFile::open(path));
-        auto again = std::make_shared<const InputFile>(std::move(reopened));
+    source.openPart = [open, header, wanted, scale, once](size_t) -> Result<PointReader> {
+        STIPPLE_ASSIGN(std::shared_ptr<const ByteSource> again, open());
         const double colourScale = (*once)([&] {
             if (!*scale) *scale = PlyReader::colourScaleOf(again, header);
             return **scale;

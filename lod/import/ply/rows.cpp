@@ -98,7 +98,7 @@ double plyColourScale(PlyType type, double largest) {
     return largest <= 2 ? 255 : largest <= 510 ? 1 : 1 / 257.0;
 }
 
-double PlyReader::colourScaleOf(const std::shared_ptr<const InputFile>& file, const PlyHeader& header) {
+double PlyReader::colourScaleOf(const std::shared_ptr<const ByteSource>& file, const PlyHeader& header) {
     const std::optional<PlyType> type = colourTypeOf(header);
     if (!type || *type < PlyType::i16) return 1;
     PlyReader reader(file, header, 0);
@@ -114,7 +114,7 @@ double PlyReader::colourScaleOf(const std::shared_ptr<const InputFile>& file, co
     return plyColourScale(*type, largest);
 }
 
-PlyReader::PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, size_t wanted, double colourScale)
+PlyReader::PlyReader(std::shared_ptr<const ByteSource> file, PlyHeader header, size_t wanted, double colourScale)
     : file_(file),
       header_(std::move(header)),
       cursor_(std::move(file), header_.bytes),

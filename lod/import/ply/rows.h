@@ -23,10 +23,10 @@ inline bool isWide(PlyType type) { return type == PlyType::f64 || type == PlyTyp
 class PlyReader {
   public:
     /// `wanted`: how many attributes the properties' slots ask for; `colourScale`: see plyColourScale.
-    PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, size_t wanted, double colourScale = 1);
+    PlyReader(std::shared_ptr<const ByteSource> file, PlyHeader header, size_t wanted, double colourScale = 1);
     /// The scale of a file's colours; its vertices are read for that where their type leaves it open. As far as the
     /// file can be read: what is wrong with it is told by who reads it.
-    static double colourScaleOf(const std::shared_ptr<const InputFile>& file, const PlyHeader& header);
+    static double colourScaleOf(const std::shared_ptr<const ByteSource>& file, const PlyHeader& header);
     /// The next rows of the element 'vertex', at most `limit`; 0 at the end.
     Result<size_t> read(PointBlock& block, size_t limit);
     /// After the last vertex: where the elements behind it begin.
@@ -48,7 +48,7 @@ class PlyReader {
     tl::unexpected<Error> badNumber(const PlyElement& element) const;
     Result<void> flushCorners();
 
-    std::shared_ptr<const InputFile> file_;
+    std::shared_ptr<const ByteSource> file_;
     PlyHeader header_;
     Cursor cursor_;
     size_t wanted_;
