@@ -225,6 +225,13 @@ TEST_F(Draco, WhatTheMeshLacksIsNamed) {
         compressed(root)["attributes"].erase(name);
         expectRefused(root, packed.bytes, std::string("lacks the attribute that is to be its ") + name);
     }
+    // Zeros that nobody draws are no lack.
+    root = sceneOf(packed);
+    root["accessors"].push_back({{"componentType", 5121}, {"count", packed.points}, {"type", "VEC4"}});
+    root["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = 5;
+    const auto zeros = read(root, packed.bytes);
+    ASSERT_TRUE(zeros) << zeros.error().line();
+    expectSheet(*zeros, 2 * 4 * 4);
     root = sceneOf(packed);
     root["accessors"][1]["type"] = "VEC4";
     expectRefused(root, packed.bytes, "NORMAL is to be VEC4, its Draco data has 3 components");
@@ -234,15 +241,6 @@ TEST_F(Draco, WhatTheMeshLacksIsNamed) {
     root = sceneOf(packed);
     root["meshes"][0]["primitives"][0]["mode"] = 1;
     expectRefused(root, packed.bytes, "has mode 1");
-    // Of skins nothing is drawn: what only they need is noted.
-    root = sceneOf(packed);
-    root["accessors"].push_back({{"componentType", 5121}, {"count", 16}, {"type", "VEC4"}});
-    root["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = root["accessors"].size() - 1;
-    const auto scene = read(root, packed.bytes);
-    ASSERT_TRUE(scene) << scene.error().line();
-    ASSERT_FALSE(scene->notes.empty());
-    EXPECT_NE(scene->notes[0].find("lacks the attribute that is to be its JOINTS_0"), std::string::npos)
-        << scene->notes[0];
 }
 
 TEST_F(Draco, CountsOfTheFileThatDifferFromTheMeshAreAFaultThatIsPassedOver) {
@@ -336,7 +334,7 @@ TEST_F(Draco, EveryTruncationAndAnyDamageEndsInASceneOrALine) {
         json half = whole;
         half["bufferViews"][0]["byteLength"] = half["buffers"][0]["byteLength"] = packed.bytes.size() / 2;
         expectRefused(half, packed.bytes.substr(0, packed.bytes.size() / 2), "damaged");
-        for (int round = 0; round < 1500; ++round) {
+        for (int round = 0; round < 700; ++round) {
             std::string bytes = packed.bytes;
             for (uint64_t n = 1 + rng.below(3); n > 0; --n)
                 bytes[rng.below(bytes.size())] = static_cast<char>(rng.below(256));

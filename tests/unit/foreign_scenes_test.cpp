@@ -53,8 +53,39 @@ class ForeignScenes : public testing::Test {
     TempFolder folder_;
 };
 
+/// What others pass over, of sizes and of how things are written: views, meshes and accessors of nothing ...
+const std::vector<std::pair<const char*, std::function<void(json&)>>>& faultsOfForm() {
+    static const std::vector<std::pair<const char*, std::function<void(json&)>>> faults{
+        {"a buffer view of nothing",
+         [](json& j) {
+             j["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 36}, {"byteLength", 0}});
+         }},
+        {"an accessor of nothing",
+         [](json& j) {
+             j["accessors"].push_back({{"bufferView", 0}, {"componentType", 5126}, {"count", 0}, {"type", "VEC3"}});
+             j["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 1}, {"NORMAL", 1}}}, {"indices", 2}});
+             j["accessors"].push_back({{"componentType", 5125}, {"count", 0}, {"type", "SCALAR"}});
+         }},
+        {"a mesh of nothing",
+         [](json& j) {
+             j["meshes"].push_back({{"primitives", json::array()}});
+         }},
+        {"a stride of 0", [](json& j) { j["bufferViews"][0]["byteStride"] = 0; }},
+        {"members that are null",
+         [](json& j) {
+             j["meshes"][0]["primitives"][0]["indices"] = j["nodes"][0]["matrix"] = j["nodes"][0]["extensions"] =
+                 nullptr;
+             j["accessors"][0]["byteOffset"] = j["accessors"][0]["normalized"] = nullptr;
+         }},
+        {"a version that is a number", [](json& j) { j["asset"]["version"] = 2.0; }},
+        {"a buffer that is longer than its file", [](json& j) { j["buffers"][0]["byteLength"] = 40; }},
+        {"what things are, required",
+         [](json& j) { j["extensionsUsed"] = j["extensionsRequired"] = {"EXT_structural_metadata"}; }}};
+    return faults;
+}
+
 TEST_F(ForeignScenes, FaultsThatChangeNothingDrawableAreNotedAndOnlyAStrictReaderRefusesThem) {
-    const std::vector<std::pair<const char*, std::function<void(json&)>>> faults{
+    std::vector<std::pair<const char*, std::function<void(json&)>>> faults{
         {"a factor above 1",
          [](json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"][0] = 1.00000012; }},
         {"empty extensions", [](json& j) { j["materials"][0]["extensions"] = json::object(); }},
@@ -96,31 +127,6 @@ TEST_F(ForeignScenes, FaultsThatChangeNothingDrawableAreNotedAndOnlyAStrictReade
          [](json& j) {
              j["nodes"][0]["rotation"] = {0, 0, 0, 1.0000001};
          }},
-        {"a buffer view of nothing",
-         [](json& j) {
-             j["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 36}, {"byteLength", 0}});
-         }},
-        {"an accessor of nothing",
-         [](json& j) {
-             j["accessors"].push_back({{"bufferView", 0}, {"componentType", 5126}, {"count", 0}, {"type", "VEC3"}});
-             j["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 1}, {"NORMAL", 1}}}, {"indices", 2}});
-             j["accessors"].push_back({{"componentType", 5125}, {"count", 0}, {"type", "SCALAR"}});
-         }},
-        {"a mesh of nothing",
-         [](json& j) {
-             j["meshes"].push_back({{"primitives", json::array()}});
-         }},
-        {"a stride of 0", [](json& j) { j["bufferViews"][0]["byteStride"] = 0; }},
-        {"members that are null",
-         [](json& j) {
-             j["meshes"][0]["primitives"][0]["indices"] = j["nodes"][0]["matrix"] = j["nodes"][0]["extensions"] =
-                 nullptr;
-             j["accessors"][0]["byteOffset"] = j["accessors"][0]["normalized"] = nullptr;
-         }},
-        {"a version that is a number", [](json& j) { j["asset"]["version"] = 2.0; }},
-        {"a buffer that is longer than its file", [](json& j) { j["buffers"][0]["byteLength"] = 40; }},
-        {"what things are, required",
-         [](json& j) { j["extensionsUsed"] = j["extensionsRequired"] = {"EXT_structural_metadata"}; }},
         {"unknown attributes", [](json& j) { j["meshes"][0]["primitives"][0]["attributes"]["COLOR"] = 0; }},
         {"a child of two",
          [](json& j) {
@@ -136,6 +142,7 @@ TEST_F(ForeignScenes, FaultsThatChangeNothingDrawableAreNotedAndOnlyAStrictReade
          }},
         {"an extension about looks",
          [](json& j) { j["extensionsUsed"] = j["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"}; }}};
+    faults.insert(faults.end(), faultsOfForm().begin(), faultsOfForm().end());
     for (const auto& [what, make] : faults) {
         json root = triangle();
         make(root);

@@ -353,7 +353,8 @@ bool isAboutLooks(const std::string& extension) {
         "CESIUM_primitive_outline", "EXT_mesh_manifold",      "FB_ngon_encoding",     "KHR_xmp",
         "AGI_articulations",        "AGI_stk_metadata"};
     const auto begins = [&](const char* with) { return extension.rfind(with, 0) == 0; };
-    return begins("KHR_materials_") || begins("KHR_texture_") || begins("EXT_texture_") || more.count(extension) != 0;
+    return begins("KHR_materials_") || begins("KHR_texture_") || begins("EXT_texture_") || begins("GOOGLE_texture_") ||
+           more.count(extension) != 0;
 }
 
 }  // namespace stipple::scene::gltf
