@@ -208,7 +208,7 @@ Result<nlohmann::json> trianglesToLevelSet(const Request& request, const nlohman
         return fail(ErrorKind::input,
                     "encloses nothing that is as wide as a voxel, and level sets are of what is closed (" +
                         std::to_string(open) + " edges are open)",
-                    layout.value("source", ""), "close it, or give a smaller --voxel");
+                    layout.value("source", "the mesh"), "close it, or give a smaller --voxel");
     grid->setName("surface");
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     const Deviation d = deviationFrom({"surface", grid, Vec3d(0)}, mesh, closest);
