@@ -28,6 +28,14 @@ struct MaterialRun {
     size_t first, n;
 };
 
+/// To the side of the interpolated normal.
+[[gnu::always_inline]] inline void turnFace(MaterialRow& s, size_t i) {
+    const vec3 face = faceBeside(vec3(s.faceX[i], s.faceY[i], s.faceZ[i]), vec3(s.nx[i], s.ny[i], s.nz[i]));
+    s.faceX[i] = face.x;
+    s.faceY[i] = face.y;
+    s.faceZ[i] = face.z;
+}
+
 void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bool hasEmission,
                    MaterialRow& __restrict s) {
     const DrawMesh m = *run.mesh;
@@ -46,10 +54,7 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
         s.nx[i] = isFlat ? s.faceX[i] : wx;
         s.ny[i] = isFlat ? s.faceY[i] : wy;
         s.nz[i] = isFlat ? s.faceZ[i] : wz;
-        const vec3 face = faceBeside(vec3(s.faceX[i], s.faceY[i], s.faceZ[i]), vec3(s.nx[i], s.ny[i], s.nz[i]));
-        s.faceX[i] = face.x;
-        s.faceY[i] = face.y;
-        s.faceZ[i] = face.z;
+        turnFace(s, i);
         s.red[i] = base.x;
         s.green[i] = base.y;
         s.blue[i] = base.z;

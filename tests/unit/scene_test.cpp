@@ -233,9 +233,7 @@ TEST(Gltf, BrokenFilesSayWhere) {
     expect(refusal([](Draft& d) { d.bytes[d.root["bufferViews"][1]["byteOffset"].get<size_t>()] = 9; }), "vertex 9");
     expect(refusal([](Draft& d) { d.root["nodes"][0]["mesh"] = 3; }), "/nodes/0/mesh");
     expect(refusal([](Draft& d) { d.root["nodes"][0]["scale"] = {1, 2}; }), "/nodes/0/scale");
-    expect(refusal([](Draft& d) {
-               d.root["extensionsRequired"] = d.root["extensionsUsed"] = {"EXT_of_nobody"};
-           }),
+    expect(refusal([](Draft& d) { d.root["extensionsRequired"] = d.root["extensionsUsed"] = {"EXT_of_nobody"}; }),
            "EXT_of_nobody");
     expect(refusal([](Draft& d) {
                const float nan = std::nanf("");

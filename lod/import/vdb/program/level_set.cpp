@@ -69,12 +69,11 @@ uint64_t putVertices(PlyFile& ply, const LevelSet& set, const Surface& surface, 
     // Slivers have a direction by rounding alone: at their corners that of the largest triangle stands for them.
     constexpr double kSliver = 0.05;  // of a triangle of equal sides
     std::vector<Vec3d> ofLargest(world.size(), Vec3d(0));
-    const auto twiceArea = [&](const Vec3I& t) {
-        return (world[t[1]] - world[t[0]]).cross(world[t[2]] - world[t[0]]);
-    };
+    const auto twiceArea = [&](const Vec3I& t) { return (world[t[1]] - world[t[0]]).cross(world[t[2]] - world[t[0]]); };
     for (const Vec3I& t : surface.triangles)
         for (int k = 0; k < 3; ++k)
-            if (twiceArea(t).length() > ofLargest[t[k]].length()) ofLargest[t[k]] = twiceArea(t) * (mirror ? -1.0 : 1.0);
+            if (twiceArea(t).length() > ofLargest[t[k]].length())
+                ofLargest[t[k]] = twiceArea(t) * (mirror ? -1.0 : 1.0);
     uint64_t count = world.size();
     for (Vec3I t : surface.triangles) {
         if (mirror) std::swap(t[1], t[2]);
