@@ -54,7 +54,7 @@ class Tasks {
     bool isEmpty() const { return next_ == tasks_.size(); }
     size_t size() const { return tasks_.size() - next_; }
     void push(std::function<void()> task) {
-        if (next_ > 0 && tasks_.size() == tasks_.capacity()) {
+        if (next_ > tasks_.size() / 2 && tasks_.size() == tasks_.capacity()) {  // each is moved once at most
             tasks_.erase(tasks_.begin(), tasks_.begin() + static_cast<std::ptrdiff_t>(next_));
             next_ = 0;
         }
