@@ -154,21 +154,11 @@ Deviation measure(const LevelSet& set, const Surface& surface) {
              {v[0], (v[0] + v[1]) * 0.5, (v[1] + v[2]) * 0.5, (v[2] + v[0]) * 0.5, (v[0] + v[1] + v[2]) / 3.0})
             addPair(set, p, field.crossing(p), out);
     }
-    auto value = set.grid->getConstAccessor();
+    const auto value = set.grid->getConstAccessor();
     for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
         if (!choice.isChosen(leaf->origin())) continue;
-        for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) {
-            const Coord at = voxel.getCoord();
-            for (int a = 0; a < 3; ++a) {
-                Coord next = at;
-                ++next[a];
-                const double here = *voxel, there = value.getValue(next);
-                if ((here < 0) == (there < 0) || !value.isValueOn(next)) continue;
-                Vec3d p = at.asVec3d();
-                p[a] += here / (here - there);
-                addPair(set, p, near.nearest(p), out);
-            }
-        }
+        for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel)
+            eachCrossing(value, voxel.getCoord(), [&](const Vec3d& p) { addPair(set, p, near.nearest(p), out); });
     }
     return out;
 }

@@ -35,6 +35,22 @@ class Field {
     openvdb::FloatGrid::ConstAccessor access_;
 };
 
+/// Calls `take` with the places, voxels, where the zero crossing meets the lines from `at` to its three next
+/// neighbours.
+template <typename Take>
+void eachCrossing(const openvdb::FloatGrid::ConstAccessor& value, const openvdb::Coord& at, const Take& take) {
+    const double here = value.getValue(at);
+    for (int a = 0; a < 3; ++a) {
+        openvdb::Coord next = at;
+        ++next[a];
+        const double there = value.getValue(next);
+        if ((here < 0) == (there < 0) || !value.isValueOn(next)) continue;
+        openvdb::Vec3d p = at.asVec3d();
+        p[a] += here / (here - there);
+        take(p);
+    }
+}
+
 /// Distances between triangles and zero crossing, of places on either.
 struct Deviation {
     uint64_t places = 0, unmeasured = 0;

@@ -146,20 +146,13 @@ Deviation deviationFrom(const LevelSet& set, const Triangles& mesh, const openvd
     const NearTriangles near(mesh, closest);
     const auto value = set.grid->getConstAccessor();
     for (auto voxel = set.grid->cbeginValueOn(); voxel; ++voxel)
-        for (int a = 0; a < 3; ++a) {
-            const Coord at = voxel.getCoord();
-            Coord next = at;
-            ++next[a];
-            const double here = *voxel, there = value.getValue(next);
-            if ((here < 0) == (there < 0) || !value.isValueOn(next)) continue;
-            Vec3d p = at.asVec3d();
-            p[a] += here / (here - there);
+        eachCrossing(value, voxel.getCoord(), [&](const Vec3d& p) {
             const double least = near.distance(p);
             if (least < 1e300)
                 out.add(least * unit, least);
             else
                 ++out.unmeasured;
-        }
+        });
     return out;
 }
 
