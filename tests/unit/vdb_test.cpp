@@ -362,8 +362,9 @@ TEST(Vdb, TrianglesGoOutAndComeBack) {
     }
     EXPECT_EQ(said["lost places"], 0);
     EXPECT_EQ(said["open edges"], 0);
-    // A field between voxels cannot follow what turns within one.
-    EXPECT_LE(said["in voxels"], 0.5);
+    // Edges of up to 2 sqrt(3) 0.05 meet at angles a of that times k, 0.43, and a field between voxels rounds a ridge
+    // by tan(a/2)/2 of one, 0.11; twice that, as places are sought along the gradient.
+    EXPECT_LE(said["in voxels"], 0.25);
     EXPECT_GT(said["in voxels"], 0);
     const lod::TriangleMesh before = collect(mesh->source), after = trianglesOf(folder / "again.vdb");
     auto second = statedOf(folder / "again.vdb");
