@@ -109,9 +109,10 @@ Streamer::~Streamer() {
 }
 
 void Streamer::addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
-                         ChunkFinish finish) {
+                         ChunkFinish finish, std::shared_ptr<lod::NodePages> pages) {
+    std::vector<PageLife> pageLives(hierarchy.known.count());
     sources_.push_back({&hierarchy, std::move(source), std::move(name), std::move(finish),
-                        std::vector<ChunkLife>(hierarchy.chunks())});
+                        std::vector<ChunkLife>(hierarchy.chunks()), std::move(pages), std::move(pageLives)});
     drawable_.emplace_back(hierarchy.chunks(), uint8_t{0});
     const auto index = static_cast<uint32_t>(sources_.size() - 1);
     for (uint32_t n = 0; n < hierarchy.chunks(); ++n) {
@@ -133,6 +134,7 @@ void Streamer::giveBack(Request& request) {
 }
 
 void Streamer::collect() {
+    collectPages();
     completed_.takeAll(taken_);
     for (Request* const request : taken_) {
         --counters_.inFlight;
@@ -295,6 +297,10 @@ void Streamer::request(const lod::Cut& cut) {
 
 void Streamer::start(uint32_t sourceIndex, uint32_t chunk) {
     Source& source = sources_[sourceIndex];
+    if (source.hierarchy->isUnknown(chunk)) {
+        startPage({sourceIndex, chunk});
+        return;
+    }
     ChunkLife& state = source.chunks[chunk];
     if ((state.state != ChunkState::absent && state.state != ChunkState::failed) || frame_ < state.retryAt) return;
     // Of no use before all that it builds on, which is asked for first.
@@ -324,6 +330,49 @@ void Streamer::start(uint32_t sourceIndex, uint32_t chunk) {
             completed_.push(request);
         });
     });
+}
+
+bool Streamer::startPage(ChunkKey unknown) {
+    Source& source = sources_[unknown.source];
+    const uint32_t page = source.hierarchy->known.pageOf(unknown.chunk);
+    PageLife& life = source.pageLives[page];
+    if (life.isRequested) return true;
+    if (!source.pages || frame_ < life.retryAt) return false;
+    life.isRequested = true;
+    ++pagesInFlight_;
+    auto request = std::make_unique<PageRequest>();
+    *request = {unknown.source, page, source.hierarchy, source.pages.get(), {}};
+    executor_.read([this, of = request.release()] {
+        std::unique_ptr<PageRequest> done(of);
+        done->read = orFail([&] { return done->pages->load(*done->hierarchy, done->page); });
+        completedPages_.push(std::move(done));
+    });
+    return true;
+}
+
+void Streamer::collectPages() {
+    if (pagesInFlight_ == 0) return;
+    for (const auto& done : completedPages_.takeAll()) {
+        --pagesInFlight_;
+        PageLife& life = sources_[done->source].pageLives[done->page];
+        life.isRequested = false;
+        if (done->read) {
+            counters_.pages += done->read->pages;
+            counters_.bytesStreamed += done->read->bytes;
+            continue;
+        }
+        life.retryAt = frame_ + kRetryFrames;
+        ++counters_.failures;
+        lastFailure_ = done->read.error().line();
+    }
+}
+
+bool Streamer::readPages(std::span<const std::pair<uint32_t, uint32_t>> unknown) {
+    bool isAny = false;
+    for (const auto& [source, chunk] : unknown) isAny = startPage({source, chunk}) || isAny;
+    executor_.wait();
+    collectPages();
+    return isAny;
 }
 
 void Streamer::makeRoomFor(const lod::ResidentPlan& plan) {

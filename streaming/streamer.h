@@ -6,13 +6,15 @@
 //   4. it is uploaded within the budget arrived -> resident     (upload; drawable from the next frame on)
 //      or nobody wants it any more      arrived -> absent
 //   5. nobody keeps it any more         resident -> absent      (evict, least recently used, children before parents)
-// A chunk that cannot be read is failed: counted, its parent stays drawn, tried again after a pause.
+// A chunk that cannot be read is failed: counted, its parent stays drawn, tried again after a pause. What the node table
+// does not know yet is asked for like a chunk: its page of the table is read then, and stays.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "engine/base/byte_source.h"
@@ -21,6 +23,7 @@
 #include "lod/cut/cut.h"
 #include "lod/cut/resident.h"
 #include "lod/store/chunk.h"
+#include "lod/store/pages.h"
 
 namespace stipple::streaming {
 
@@ -57,6 +60,7 @@ struct StreamSettings {
 struct StreamCounters {
     uint64_t bytesStreamed = 0, residentBytes = 0, requests = 0, uploads = 0, evictions = 0, failures = 0, refused = 0;
     uint64_t unwanted = 0;  ///< arrived when nobody wanted them any more
+    uint64_t pages = 0;     ///< of node tables, read since the stores were opened; their bytes are among those streamed
     uint32_t inFlight = 0;
 };
 
@@ -68,9 +72,9 @@ class Streamer {
     Streamer& operator=(const Streamer&) = delete;
 
     /// One more store to stream from; `hierarchy` must outlive the streamer. `finish` (may be empty) is called with
-    /// every decoded chunk on the thread that decoded it.
+    /// every decoded chunk on the thread that decoded it. `pages`: of a table that is read as it is needed.
     void addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
-                   ChunkFinish finish = {});
+                   ChunkFinish finish = {}, std::shared_ptr<lod::NodePages> pages = {});
     /// Takes in what workers finished since the last call.
     void collect();
     /// Uploads arrived chunks within the budgets, evicting if needed.
@@ -84,6 +88,8 @@ class Streamer {
     void makeRoomFor(const lod::ResidentPlan& plan);
     /// As request: starts what the plan has and what is not there.
     void request(const lod::ResidentPlan& plan);
+    /// Reads the pages of the node tables that tell of those chunks, and waits for them; false: none can be read.
+    bool readPages(std::span<const std::pair<uint32_t, uint32_t>> unknown);
     /// (source, chunk) that could not be read, or that the sink could not take; `isDue`: also those to be tried again.
     std::vector<std::pair<uint32_t, uint32_t>> failed(bool isDue) const;
     uint64_t residentLimit() const { return settings_.residentBytes; }
@@ -93,7 +99,7 @@ class Streamer {
     /// Waits for all that is on its way from the executor.
     void wait() { executor_.wait(); }
     /// True if nothing is on its way.
-    bool isIdle() const { return counters_.inFlight == 0 && arrived_.empty(); }
+    bool isIdle() const { return counters_.inFlight == 0 && pagesInFlight_ == 0 && arrived_.empty(); }
     /// The last failure, for the overlay and the log; empty if there was none.
     const std::string& lastFailure() const { return lastFailure_; }
 
@@ -104,15 +110,31 @@ class Streamer {
         uint64_t lastUsed = 0, lastWanted = 0, retryAt = 0;
         ChunkKey before, after;  ///< in the list of what may be evicted, least recently used first; alone: itself
     };
+    struct PageLife {
+        bool isRequested = false;
+        uint64_t retryAt = 0;
+    };
     struct Source {
         const lod::Hierarchy* hierarchy;
         std::shared_ptr<const ByteSource> bytes;
         std::string name;
         ChunkFinish finish;
         std::vector<ChunkLife> chunks;
+        std::shared_ptr<lod::NodePages> pages;
+        std::vector<PageLife> pageLives;
     };
     /// A chunk on its way, from start() until it is uploaded or dropped.
     struct Request;
+    /// A page of a node table on its way.
+    struct PageRequest {
+        uint32_t source = 0, page = 0;
+        const lod::Hierarchy* hierarchy = nullptr;
+        lod::NodePages* pages = nullptr;
+        Result<lod::NodePages::Loaded> read;
+    };
+    /// Of the page that tells of a chunk which is not known; false: it cannot be read now.
+    bool startPage(ChunkKey unknown);
+    void collectPages();
     void setState(ChunkKey key, ChunkState to);
     bool makeRoom(uint64_t bytes);
     void start(uint32_t source, uint32_t chunk);
@@ -146,6 +168,8 @@ class Streamer {
     std::vector<std::unique_ptr<Request>> requests_;
     std::vector<Request*> spare_, arrived_, taken_;
     CompletionQueue<Request*> completed_;
+    CompletionQueue<std::unique_ptr<PageRequest>> completedPages_;
+    uint32_t pagesInFlight_ = 0;
     std::vector<lod::CutWanted> wanted_;
     std::vector<ChunkKey> others_;
     StreamCounters counters_;

@@ -6,7 +6,7 @@
 namespace stipple::v1 {
 
 Result<Store> Store::open(const std::string& path) {
-    auto opened = scene::openStoreFile(path);
+    auto opened = scene::openStoreFile(path, lod::Tables::asNeeded);
     if (!opened) return given(opened.error());
     return Store(std::make_shared<const Held>(Held{std::move(*opened)}));
 }

@@ -179,6 +179,7 @@ Result<void> readStore(const render::PlacedStore& placed, TracedStore& t) {
     const lod::Store& store = *placed.store;
     t.store = &store;
     t.colour = placed.colour;
+    STIPPLE_TRY(lod::readWholeTable(store));
     STIPPLE_TRY(store.hierarchy.isMesh() ? readMesh(t) : readTree(t));
     std::vector<Box> boxes;
     boxes.reserve(t.discs.size() + t.triangles.size());

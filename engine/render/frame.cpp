@@ -140,7 +140,7 @@ class Placer {
         if (isPlain) plainSources_[p.store.get()] = number;
         state_.discSizes->addSource(p.store->hierarchy);
         state_.streamer->addSource(p.store->hierarchy, p.store->file, p.store->path,
-                                   p.patchesAreSamples ? withSamples(finishOf(p), p) : finishOf(p));
+                                   p.patchesAreSamples ? withSamples(finishOf(p), p) : finishOf(p), p.store->pages);
         return number;
     }
 
@@ -404,7 +404,9 @@ Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const
     for (;;) {
         lod::planResident(state.scene(), view, settings.budgets, streamer.residentLimit(), barred, state.scratch,
                           state.cut, state.plan);
+        if (streamer.readPages(state.plan.unknown)) continue;
         planFurtherViews(state, view, settings, barred);
+        if (streamer.readPages(state.plan.unknown)) continue;
         const uint64_t failures = streamer.counters().failures;
         STIPPLE_TRY(await(state.plan, streamer));
         if (streamer.counters().failures == failures) break;

@@ -35,7 +35,7 @@ std::vector<uint32_t> coarseNodes(const lod::Hierarchy& h) {
         records = 0;
         for (const uint32_t n : front) {
             const lod::Node& node = h.nodes[n];
-            const int children = __builtin_popcount(node.childMask);
+            const int children = h.hasChildrenOf(node) ? __builtin_popcount(node.childMask) : 0;
             if (children == 0) next.push_back(n);
             for (int c = 0; c < children; ++c) next.push_back(node.firstChild + static_cast<uint32_t>(c));
         }
@@ -160,6 +160,7 @@ std::vector<glm::dvec3> outlineOf(const lod::Store& store) {
     // (Where some curves are stray, the nodes that reach farthest are theirs.)
     const bool hasStrays = d.focusMin != d.boundsMin || d.focusMax != d.boundsMax;
     if (h.isMesh() || (h.isCurves && !hasStrays)) {
+        if (!lod::readWholeTable(store)) return box;  // whoever draws it says why
         all = outlineOfInput(store);
     } else {
         bool isRead = true;

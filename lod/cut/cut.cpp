@@ -197,7 +197,21 @@ void beginCut(const CutFrame& frame, Cut& cut) {
 
 void emitCutAt(const CutFrame& frame, const PlannedStep& step, const Target& target, uint64_t budget, Cut& cut) {
     cut.tauTarget = tauAt(step.planned, target.step, target.tau);
-    emitCut(frame, step.drawn, cut);
+    emitCut(frame, step.planned, cut);
+    if (step.drawn != step.planned) {
+        // Wanted and kept is what the full cut needs, or what is drawn meanwhile would stay.
+        const size_t wanted = cut.wanted.size(), keep = cut.keep.size();
+        const uint64_t missing = cut.counters.nodesMissing, evaluations = cut.counters.evaluations;
+        cut.draw.clear();
+        cut.meshDraw.clear();
+        cut.counters = {};
+        cut.tauEffective = 0;
+        emitCut(frame, step.drawn, cut);
+        cut.wanted.resize(wanted);
+        cut.keep.resize(keep);
+        cut.counters.nodesMissing = missing;
+        cut.counters.evaluations = evaluations;
+    }
     cut.tauEffective = std::max(cut.tauEffective, tauAt(step.drawn, target.step, target.tau));
     if (cut.counters.recordsDrawn + cut.counters.trianglesDrawn > budget) truncate(budget, cut);
     cut.counters.nodesDrawn += cut.draw.size();

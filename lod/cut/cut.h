@@ -100,6 +100,7 @@ struct CutMeshDraw {
     float errorPixels = 0;
 };
 
+/// Also of nodes that the table does not know yet (Hierarchy::isUnknown): it is to be read there.
 struct CutWanted {
     uint32_t source = 0, chunk = 0;
     float priority = 0;  ///< pixels of error that it would remove, parents always above children

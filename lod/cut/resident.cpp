@@ -32,6 +32,12 @@ class Planner {
             if (!std::exchange(plan_.chunks[source][chunk], uint8_t{1}))
                 plan_.bytes += decodedBytes(*of_[source], chunk);
     }
+    /// What `cut` wants and no table tells anything of.
+    void tellUnknown(const Cut& cut) {
+        plan_.unknown.clear();
+        for (const CutWanted& w : cut.wanted)
+            if (of_[w.source]->isUnknown(w.chunk)) plan_.unknown.emplace_back(w.source, w.chunk);
+    }
     bool fits() const { return plan_.bytes <= residentBytes_; }
 
     void beginRounds(std::span<const std::pair<uint32_t, uint32_t>> barred) {
@@ -45,7 +51,7 @@ class Planner {
         std::sort(wanted_.begin(), wanted_.end(), isMoreUrgent);
         bool isLean = false, grew = false;
         for (const CutWanted& w : wanted_) {
-            if (asked_[w.source][w.chunk] || !hasParents(w)) continue;
+            if (asked_[w.source][w.chunk] || of_[w.source]->isUnknown(w.chunk) || !hasParents(w)) continue;
             const uint64_t bytes = decodedBytes(*of_[w.source], w.chunk);
             if (plan_.bytes + bytes > residentBytes_ && !isLean) {
                 const std::vector<std::vector<uint8_t>> before = plan_.chunks;
@@ -102,7 +108,9 @@ void planResident(const CutScene& scene, uint64_t residentBytes, std::span<const
     plan.refused = 0;
     planner.fill(1);
     for (const auto& [source, chunk] : barred) plan.chunks[source][chunk] = 0;
-    planner.keepOnly(cutOf({plan.chunks}));
+    const Cut& whole = cutOf({plan.chunks});
+    planner.tellUnknown(whole);
+    planner.keepOnly(whole);
     if (planner.fits()) return;
     planner.beginRounds(barred);
     for (;;) {

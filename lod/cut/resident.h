@@ -20,6 +20,8 @@ struct ResidentPlan {
     std::vector<std::vector<uint8_t>> chunks;  ///< of each source, a byte a chunk: 1 where it is resident
     uint64_t bytes = 0;                        ///< of all of them, decoded
     uint64_t refused = 0;                      ///< chunks that the cut goes on wanting: there is no room
+    /// (source, chunk) that the cut wants and the node table does not know yet: the plan holds once it does.
+    std::vector<std::pair<uint32_t, uint32_t>> unknown;
     bool isComplete() const { return refused == 0; }
 };
 

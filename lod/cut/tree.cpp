@@ -98,18 +98,19 @@ void walkTree(const Payloads& of, const CutFrame& frame, uint32_t i, int step, c
             index == 0 ? ErrorScale::kLargest : std::min(codeOf(slot, parentEpsilon, step), largest);
         const uint32_t code = std::min(codeOf(slot, epsilon, step), largest);
         if (!use(OnTheWay{index, epsilon, parentEpsilon, code, parentCode})) return;
-        if (of.errorCode(index) <= code || !isReached(index)) continue;
+        if (of.errorCode(index) <= code || !isReached(index) || !h.hasChildrenOf(node)) continue;
         const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
         for (uint32_t c = 0; c < children; ++c) stack.push_back(node.firstChild + c);
     }
 }
 
-/// Octants of children that are in view and cannot be drawn.
+/// Octants of children that are in view and cannot be drawn (of children that are not known: all).
 template <typename Payloads>
 uint32_t missingOctants(const Payloads& of, const CutFrame& frame, const Hierarchy& h, const CutScratch::Slot& slot,
                         const std::vector<uint8_t>& drawable, const OnTheWay& at) {
     const Node& node = h.nodes[at.index];
     if (of.errorCode(at.index) <= at.code) return 0;
+    if (!h.hasChildrenOf(node)) return node.childMask;
     uint32_t mask = 0, child = node.firstChild;
     for (uint32_t octant = 0; octant < 8; ++octant) {
         if (!(node.childMask >> octant & 1u)) continue;
@@ -149,7 +150,8 @@ CutCost costOfWalk(const Payloads& of, const CutFrame& frame, uint32_t i, int st
         walkTree(
             of, frame, i, step, [] {}, [](uint32_t) { return true; },
             [&](const OnTheWay& at) {
-                cost.isWhole = cost.isWhole && isThere(of, drawable, at.index);
+                cost.isWhole = cost.isWhole && isThere(of, drawable, at.index) &&
+                               (h.hasChildrenOf(h.nodes[at.index]) || of.errorCode(at.index) <= at.code);
                 return add(at, 0);
             });
         return cost;
@@ -192,6 +194,14 @@ void emitWalk(const Payloads& of, const CutFrame& frame, uint32_t i, int step, C
             cut.wanted.push_back({source, chunk, priorityOf(at)});
         });
         cut.counters.nodesMissing += isWhole ? 0 : 1;
+        if (const Node& node = h.nodes[at.index]; of.errorCode(at.index) > at.code && !h.hasChildrenOf(node)) {
+            const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
+            const auto pixels = static_cast<float>(pixelsOf(slot, of.errorCode(at.index), at.epsilon) *
+                                                   std::exp2(8.0 - node.level - 1));
+            for (uint32_t child = node.firstChild; child < node.firstChild + children; ++child)
+                if (!h.known.hasNode(child)) cut.wanted.push_back({source, child, pixels});
+            ++cut.counters.nodesMissing;
+        }
         // Only what hangs together with the root is drawn: a node whose parent is missing is covered above.
         if (isWhole && hangsTogether(of, drawable, h, at.index))
             of.emit(frame, slot, i, at.index, askedOf(at, missingOctants(of, frame, h, slot, drawable, at), largest),

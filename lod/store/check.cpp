@@ -62,29 +62,40 @@ bool isPossiblePayload(const Hierarchy& h, uint32_t chunk, uint64_t chunksEnd) {
 }
 
 /// No byte of the file is in two streams: what they hold together is no more than the file is.
-Result<void> checkOverlaps(const Store& store) {
-    const Hierarchy& h = store.hierarchy;
-    std::vector<std::pair<uint64_t, uint64_t>> ranges;
-    ranges.reserve(h.nodes.size() + h.further.size() + h.streams.size());
-    bool isAscending = true;
-    const auto add = [&](uint64_t offset, uint64_t bytes) {
+class Overlaps {
+  public:
+    void add(uint64_t offset, uint64_t bytes) {
         if (bytes == 0) return;
-        isAscending = isAscending && (ranges.empty() || ranges.back().second <= offset);
-        ranges.emplace_back(offset, offset + bytes);
-    };
-    for (uint32_t n = 0; n < h.nodes.size(); ++n)
-        h.forEachPayload(n, [&](uint32_t chunk) {
+        isAscending_ = isAscending_ && (ranges_.empty() || ranges_.back().second <= offset);
+        ranges_.emplace_back(offset, offset + bytes);
+    }
+    void addNode(const Hierarchy& h, uint32_t node) {
+        h.forEachPayload(node, [&](uint32_t chunk) {
             const Payload& p = h.payload(chunk);
             add(p.chunkOffset, uint64_t{p.chunkBytes} + p.attributeBytes);
         });
-    for (const Stream& s : h.streams) add(s.offset, s.bytes);
-    if (isAscending) return {};
-    std::sort(ranges.begin(), ranges.end());
-    for (size_t i = 1; i < ranges.size(); ++i)
-        if (ranges[i].first < ranges[i - 1].second)
-            return tl::unexpected(damagedStore(
-                store.path, fmt::format("two streams share the bytes at offset {}: not possible", ranges[i].first)));
-    return {};
+    }
+    Result<void> check(const std::string& path) {
+        if (isAscending_) return {};
+        std::sort(ranges_.begin(), ranges_.end());
+        for (size_t i = 1; i < ranges_.size(); ++i)
+            if (ranges_[i].first < ranges_[i - 1].second)
+                return tl::unexpected(damagedStore(
+                    path, fmt::format("two streams share the bytes at offset {}: not possible", ranges_[i].first)));
+        return {};
+    }
+
+  private:
+    std::vector<std::pair<uint64_t, uint64_t>> ranges_;
+    bool isAscending_ = true;
+};
+
+Result<void> checkOverlaps(const Store& store) {
+    const Hierarchy& h = store.hierarchy;
+    Overlaps all;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n) all.addNode(h, n);
+    for (const Stream& s : h.streams) all.add(s.offset, s.bytes);
+    return all.check(store.path);
 }
 
 bool isPossibleMaterial(const shared::SurfaceMaterial& m, size_t textures) {
@@ -159,39 +170,70 @@ Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
     return {};
 }
 
-/// A tree, breadth first: the children of a node follow those of the node before it, so that no node is the child of
-/// two; each lies in its octant of its parent's cell.
-Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
-    const Hierarchy& h = store.hierarchy;
-    const auto& nodes = h.nodes;
-    uint64_t next = 1;
-    for (size_t i = 0; i < nodes.size(); ++i) {
-        const Node& n = nodes[i];
-        bool fits = isPossiblePlace(n) && (i > 0 || n.level == 0) && n.level <= h.rootLog2;
-        h.forEachPayload(static_cast<uint32_t>(i), [&](uint32_t chunk) {
-            const Payload& p = h.payload(chunk);
-            const KindTraits& kind = traitsOf(p.kind);
-            const int bits = h.isStochastic ? 15 : static_cast<int>(kind.cellBits);
-            const int shift = bits == 0 ? 0 : static_cast<int>(h.rootLog2) - n.level - bits;
-            fits = fits && p.stepShift == shift && kind.isPossible(h, chunk) && isPossiblePayload(h, chunk, chunksEnd);
-        });
-        // A cone says of all that is below its node that it faces away: only points do.
-        fits = fits && !(h.isMixed && n.normalConeCosine > 0);
-        uint64_t child = n.firstChild;
-        fits = fits && (n.isLeaf() || n.firstChild == next);
-        for (uint32_t octant = 0; fits && octant < 8; ++octant) {
-            if (!(n.childMask >> octant & 1u)) continue;
-            fits = child < nodes.size() && nodes[child].parent == i && nodes[child].level == n.level + 1;
-            for (uint32_t axis = 0; fits && axis < 3; ++axis)
-                fits = nodes[child].cell.at(axis) == 2 * n.cell.at(axis) + (octant >> axis & 1u);
-            ++child;
-            ++next;
-        }
-        if (!fits)
-            return tl::unexpected(
-                damagedStore(store.path, fmt::format("node {} of the node table is not possible", i)));
+/// Its own: place, payloads.
+bool isPossibleNode(const Hierarchy& h, uint32_t number, uint64_t chunksEnd) {
+    const Node& n = h.nodes[number];
+    bool fits = isPossiblePlace(n) && (number > 0 || n.level == 0) && n.level <= h.rootLog2;
+    h.forEachPayload(number, [&](uint32_t chunk) {
+        const Payload& p = h.payload(chunk);
+        const KindTraits& kind = traitsOf(p.kind);
+        const int bits = h.isStochastic ? 15 : static_cast<int>(kind.cellBits);
+        const int shift = bits == 0 ? 0 : static_cast<int>(h.rootLog2) - n.level - bits;
+        fits = fits && p.stepShift == shift && kind.isPossible(h, chunk) && isPossiblePayload(h, chunk, chunksEnd);
+    });
+    // A cone says of all that is below its node that it faces away: only points do.
+    return fits && !(h.isMixed && n.normalConeCosine > 0);
+}
+
+/// Is it the child of its parent, in its octant of the parent's cell?
+bool isPossibleChild(const Hierarchy& h, uint32_t number) {
+    const Node& n = h.nodes[number];
+    if (n.parent >= number) return false;
+    const Node& parent = h.nodes[n.parent];
+    uint32_t child = parent.firstChild;
+    for (uint32_t octant = 0; octant < 8; ++octant) {
+        if (!(parent.childMask >> octant & 1u)) continue;
+        if (child++ != number) continue;
+        bool fits = n.level == parent.level + 1;
+        for (uint32_t axis = 0; axis < 3; ++axis)
+            fits = fits && n.cell.at(axis) == 2 * parent.cell.at(axis) + (octant >> axis & 1u);
+        return fits;
     }
-    if (next != nodes.size()) return tl::unexpected(damagedStore(store.path, "some nodes are nobody's children"));
+    return false;
+}
+
+/// What the nodes before have of children (and the root), and of runs.
+struct Before {
+    uint64_t children = 1, runs = 0;
+};
+
+/// Of a tree, breadth first, nodes `begin` to `end`: the children of a node follow those of the node before it, so that
+/// no node is the child of two, and so do the runs of its triangles. `before` moves on. What is above them was checked.
+Result<void> checkTree(const Hierarchy& h, const std::string& path, uint64_t begin, uint64_t end, uint64_t chunksEnd,
+                       Before& before) {
+    for (uint64_t i = begin; i < end; ++i) {
+        const auto number = static_cast<uint32_t>(i);
+        const Node& n = h.nodes[i];
+        bool fits = isPossibleNode(h, number, chunksEnd) && (n.isLeaf() || n.firstChild == before.children) &&
+                    (i == 0 || isPossibleChild(h, number));
+        h.forEachPayload(number, [&](uint32_t chunk) {
+            const Payload& p = h.payload(chunk);
+            if (p.kind != Kind::triangles) return;
+            fits = fits && h.groups[p.group].firstRun == before.runs;
+            before.runs += h.groups[p.group].runs;
+        });
+        before.children += static_cast<uint64_t>(__builtin_popcount(n.childMask));
+        if (!fits || before.children > h.nodes.size())
+            return tl::unexpected(damagedStore(path, fmt::format("node {} of the node table is not possible", i)));
+    }
+    return {};
+}
+
+Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
+    Before before;
+    const uint64_t nodes = store.hierarchy.nodes.size();
+    STIPPLE_TRY(checkTree(store.hierarchy, store.path, 0, nodes, chunksEnd, before));
+    if (before.children != nodes) return tl::unexpected(damagedStore(store.path, "some nodes are nobody's children"));
     return {};
 }
 
@@ -219,6 +261,7 @@ Result<void> checkTables(const Store& store, uint64_t chunksEnd) {
     if (h.isStochastic && !isPoints) return bad("holds stochastic points and something else");
     if (h.isGraph && (h.isMixed || h.groups.size() != h.nodes.size()))
         return bad("the groups of the mesh are not possible");
+    if (!h.known.isWhole()) return checkTextures(store, chunksEnd);  // the rest page by page
     uint64_t groups = 0;
     for (uint32_t n = 0; n < h.nodes.size(); ++n)
         h.forEachPayload(n, [&](uint32_t chunk) { groups += kindOf(h, chunk) == Kind::triangles ? 1 : 0; });
@@ -228,14 +271,38 @@ Result<void> checkTables(const Store& store, uint64_t chunksEnd) {
     return checkOverlaps(store);
 }
 
+Result<void> checkPage(const Hierarchy& h, const layout::Places& first, const layout::Places& end, uint32_t flags,
+                       uint64_t chunksEnd, const std::string& path) {
+    const auto bad = [&](const char* what) { return tl::unexpected(damagedStore(path, what)); };
+    Overlaps overlaps;
+    uint64_t groups = 0;
+    for (uint64_t i = first.nodes; i < end.nodes; ++i) {
+        const Node& n = h.nodes[i];
+        const bool isPatches = n.kind == Kind::patches, hasPatches = (flags & layout::kTablePatches) != 0;
+        if (!h.isMixed && (n.furtherPayloads > 0 || n.kind != h.nodes[0].kind))
+            return bad("is not of the kind that it says it is");
+        if (isPatches && !hasPatches) return bad("has patches and says that it has none");
+        if (isPatches && n.isLeaf() && n.sourceCode == 0)
+            return bad("a leaf of patches does not state its distance from the source");
+        h.forEachPayload(static_cast<uint32_t>(i),
+                         [&](uint32_t chunk) { groups += kindOf(h, chunk) == Kind::triangles ? 1 : 0; });
+        overlaps.addNode(h, static_cast<uint32_t>(i));
+    }
+    if (groups != end.groups - first.groups) return bad("the groups of the mesh are not possible");
+    for (uint64_t k = first.streams; k < end.streams; ++k) overlaps.add(h.streams[k].offset, h.streams[k].bytes);
+    Before before{first.children, first.runs};
+    STIPPLE_TRY(checkTree(h, path, first.nodes, end.nodes, chunksEnd, before));
+    if (before.children != end.children || before.runs != end.runs) return bad("the pages of nodes are not possible");
+    return overlaps.check(path);
+}
+
 bool isPossibleGroup(const Hierarchy& h, uint32_t chunk) {
     const Payload& p = h.payload(chunk);
     const MeshGroup& g = h.groups[p.group];
     const auto oneCode = [](const CodeCounts& c) { return c.lo == c.hi; };
-    const MeshGroup before = p.group == 0 ? MeshGroup{} : h.groups[p.group - 1];
     bool fits = h.rootLog2 <= kShortMeshBits && oneCode(p.parentCounts) && oneCode(p.ownCounts) &&
                 p.errorCode == p.ownCounts.hi && g.parents == 0 && g.textures == 0 && g.runs > 0 && g.runs <= 8 &&
-                g.firstRun == uint64_t{before.firstRun} + before.runs && uint64_t{g.firstRun} + g.runs <= h.runs.size();
+                uint64_t{g.firstRun} + g.runs <= h.runs.size();
     fits = fits && g.vertices <= uint64_t{g.clusters} * shared::kClusterVertices && g.clusters <= p.records &&
            p.records <= uint64_t{g.clusters} * shared::kClusterTriangles;
     uint64_t triangles = 0, clusters = 0;

@@ -2,6 +2,7 @@
 // file, not that somebody did not write it on purpose.
 #pragma once
 
+#include "lod/store/layout.h"
 #include "lod/store/store.h"
 
 namespace stipple::lod {
@@ -22,7 +23,12 @@ inline bool isPossibleGain(uint64_t bytes, uint64_t rawBytes) { return rawBytes 
 
 /// Everything that selectCut, the streamer and the renderers index by or walk along, and that their numbers stay
 /// finite. Chunks end before `chunksEnd`.
+/// Of a table that is read page by page: what is known without them.
 Result<void> checkTables(const Store& store, uint64_t chunksEnd);
+/// The same of a page of the table of a tree, whose parents' pages were checked; `flags`: layout::kTable... (That
+/// streams of different pages share no bytes is checked where all pages are.)
+Result<void> checkPage(const Hierarchy& h, const layout::Places& first, const layout::Places& end, uint32_t flags,
+                       uint64_t chunksEnd, const std::string& path);
 
 /// Of a payload of triangles of an octree: is its group? A run is what lies in an octant of the node's cell; textures
 /// and coordinates of more than 30 bits there are none.

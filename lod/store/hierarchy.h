@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <vector>
 
 #include "lod/primitives/mesh.h"
@@ -66,7 +68,44 @@ struct FurtherPayload : Payload {
     uint32_t node = 0;
 };
 
+/// Which pages of a node table are there: all, or those that were read so far (pages.h), also while others look. A copy
+/// has those that were there when it was made.
+class KnownPages {
+  public:
+    KnownPages() = default;
+    /// Of 2^log2Nodes nodes each; none is there.
+    KnownPages(uint32_t log2Nodes, size_t pages) : log2Nodes_(log2Nodes), count_(pages) {
+        if (pages > 0) isThere_ = std::make_unique<std::atomic<bool>[]>(pages);
+    }
+    KnownPages(const KnownPages& other) : KnownPages(other.log2Nodes_, other.count_) {
+        for (size_t p = 0; p < count_; ++p) isThere_[p] = other.isThere(static_cast<uint32_t>(p));
+    }
+    KnownPages(KnownPages&&) = default;
+    KnownPages& operator=(KnownPages other) {
+        std::swap(isThere_, other.isThere_);
+        log2Nodes_ = other.log2Nodes_;
+        count_ = other.count_;
+        return *this;
+    }
+    ~KnownPages() = default;
+
+    /// Nothing is asked for page by page: all are there.
+    bool isWhole() const { return count_ == 0; }
+    size_t count() const { return count_; }
+    uint32_t pageOf(uint32_t node) const { return node >> log2Nodes_; }
+    bool isThere(uint32_t page) const { return isThere_[page].load(std::memory_order_acquire); }
+    bool hasNode(uint32_t node) const { return isWhole() || isThere(pageOf(node)); }
+    /// Of each page, for whoever reads them (pages.h): what was written before one is set is seen by those who find it.
+    std::atomic<bool>* places() { return isThere_.get(); }
+
+  private:
+    std::unique_ptr<std::atomic<bool>[]> isThere_;
+    uint32_t log2Nodes_ = 0;
+    size_t count_ = 0;
+};
+
 struct Hierarchy {
+    KnownPages known;       ///< first: a copy has of what follows at least what it says (nodes that are not: anything)
     glm::dvec3 origin{0};   ///< world position of lattice (0,0,0)
     double unit = 1;        ///< world units per lattice step
     uint32_t rootLog2 = 0;  ///< the root's cell has 2^rootLog2 lattice steps along each axis
@@ -124,6 +163,17 @@ struct Hierarchy {
     uint32_t nodeOf(uint32_t chunk) const {
         return chunk < nodes.size() ? chunk : further[chunk - nodes.size() - tiles.size()].node;
     }
+    /// Is what the table says of a node's children there? (First children and further payloads of unknown nodes are
+    /// unknown, too: nobody asks for other chunks of theirs than that of the node's number.)
+    bool hasChildrenOf(const Node& n) const {
+        if (known.isWhole() || n.isLeaf()) return true;
+        const uint32_t last = n.firstChild + static_cast<uint32_t>(__builtin_popcount(n.childMask)) - 1;
+        for (uint32_t page = known.pageOf(n.firstChild); page <= known.pageOf(last); ++page)
+            if (!known.isThere(page)) return false;
+        return true;
+    }
+    /// Of a chunk that a cut wants.
+    bool isUnknown(uint32_t chunk) const { return !known.isWhole() && chunk < nodes.size() && !known.hasNode(chunk); }
     /// Calls use(chunk) for every payload of a node.
     template <typename Use>
     void forEachPayload(uint32_t node, const Use& use) const {

@@ -1,11 +1,17 @@
 // The bytes of a .stipple file, and which field of them is which field in memory: each is named once, for reading and
 // for writing. Little-endian.
 //
-//   Head | streams of payloads | nodes | counts | description | mesh | payloads | Foot
+//   Head | streams of payloads | pages of nodes | pages | description | mesh | Foot
 //
-// Sections are compressed with zstd; that of the mesh holds a MeshHead and then its arrays in the order of its fields,
-// that of the payloads a PayloadHead and then its own. Payloads come in the order of their nodes, streams in that of
-// their payloads, groups of triangles in that of the payloads of triangles.
+// Sections are compressed with zstd. A page holds a PageHead and then all that the table says of 2^k nodes that follow
+// each other, in arrays in the order of TablePart (tables.h): nodes come breadth first, payloads in the order of their
+// nodes, streams in that of their payloads, groups of triangles in that of the payloads of triangles. The section of
+// the pages is the directory: a TableHead, the names of kinds and of codecs, and of each page where it is and what
+// stands before it. So a first image needs the head, the directory, the first page, and those that it looks at. The
+// section of the mesh holds a MeshHead and then textures and tiles.
+//
+// Versions 8 and 9 have one section for all nodes, one for counts per code, one for payloads (a PayloadHead and then
+// its arrays), and that of the mesh holds the groups, too.
 //
 // Versions 6 and 7 (meshes whose coordinates have more than 30 bits) have one payload a node, which stands in the node
 // itself, and no section of payloads: their kind follows from the description and from whether there are groups.
@@ -35,9 +41,9 @@ struct Head {
     std::array<double, 3> origin;
     double unit, smallestError;
     uint64_t nodeCount, fileBytes, contentHash;
-    Section nodes, counts, description, mesh;
+    Section nodes, counts, description, mesh;  // `nodes` is that of the pages, `counts` is of versions before 10
     // (Of versions 6 and 7 the hash follows here.)
-    Section payloads;
+    Section payloads;  // of versions 8 and 9
     uint32_t isGraph, reserved;
     uint64_t hash;  // of everything before
 };
@@ -93,6 +99,32 @@ static_assert(sizeof(StreamOnDisk) == 24);
 /// (code, count) of one code that occurs in a payload.
 struct CodeCount {
     uint32_t code, count;
+};
+
+/// How much of each array of the table stands before a page (all in memory; `steps`: of Hierarchy::greaterThan).
+struct Places {
+    uint64_t nodes, further, streams, steps, groups, runs, parents, groupTextures;
+    uint64_t children;  // of the nodes before, and the root: the number of the page's first child
+};
+struct PageOnDisk {
+    Section section;
+    Places first;
+};
+
+struct TableHead {
+    uint64_t kinds, codecs, pages;
+    uint32_t log2Nodes, flags;  // of a page; kTable...
+    Places total;
+};
+static_assert(sizeof(PageOnDisk) == 104 && sizeof(TableHead) == 104);
+inline constexpr uint32_t kTableMixed = 1;          // Hierarchy::isMixed
+inline constexpr uint32_t kTablePatches = 2;        // some nodes' first payload is one of patches
+inline constexpr uint32_t kTableOneSourceCode = 4;  // Hierarchy::hasOneSourceCode
+inline constexpr uint32_t kTableFlags = 7;
+
+/// Of a page: how many streams (all, as they are in the file) and pairs of CodeCount it has.
+struct PageHead {
+    uint64_t streams, pairs;
 };
 
 /// Of the mesh section: the counts, then groups, runs and parents.

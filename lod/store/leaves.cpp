@@ -69,6 +69,7 @@ Result<PointSource> leafPoints(std::shared_ptr<const Store> store) {
     const StoreDescription& d = store->description;
     if (h.isMixed || h.isStochastic || h.nodes.empty() || h.nodes[0].kind != Kind::points)
         return otherKind(*store, "points alone");
+    STIPPLE_TRY(readWholeTable(*store));
     PointSource source;
     source.info.path = store->path;
     source.info.format = "Stipple";

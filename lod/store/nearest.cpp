@@ -21,6 +21,7 @@ struct Candidate {
 }  // namespace
 
 Result<NearestPoint> findNearest(const Store& store, const glm::dvec3& place) {
+    STIPPLE_TRY(readWholeTable(store));
     const Hierarchy& h = store.hierarchy;
     const glm::dvec3 target = (place - h.origin) / h.unit;
     const auto toSphere = [&](const Node& n) { return std::max(0.0, glm::length(n.centre - target) - n.radius); };
@@ -67,6 +68,7 @@ Result<NearestPoint> findNearest(const Store& store, const glm::dvec3& place) {
 }
 
 Result<double> largestLeafRadius(const Store& store) {
+    STIPPLE_TRY(readWholeTable(store));
     double largest = 0;
     const Hierarchy& h = store.hierarchy;
     for (uint32_t n = 0; n < h.nodes.size(); ++n) {

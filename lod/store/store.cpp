@@ -14,6 +14,7 @@
 #include "lod/store/layout.h"
 #include "lod/store/materials.h"
 #include "lod/store/mesh_place.h"
+#include "lod/store/pages.h"
 #include "lod/store/tables.h"
 #include "lod/store/zstd_memory.h"
 
@@ -70,40 +71,32 @@ Result<Stream> StoreWriter::appendStream(StreamId id, const std::vector<uint8_t>
     return stream;
 }
 
-Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& description) {
+Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& description, uint32_t log2PageNodes) {
     STIPPLE_TRY(checkSpace(h, description));
-    const TableBytes tables = tablesOf(h);
     const std::string text = describeAsText(description);
     Head head{};
-    auto write = [&](const void* raw, size_t count, Section& section) -> Result<void> {
-        const std::vector<uint8_t> bytes = packed(raw, count);
-        section = {file_.position(), bytes.size(), count, hashBytes(bytes.data(), bytes.size())};
-        return file_.append(bytes.data(), bytes.size());
+    const auto write = [&](const auto& raw) -> Result<Section> {
+        const std::vector<uint8_t> bytes = packed(raw.data(), raw.size());
+        const Section section{file_.position(), bytes.size(), raw.size(), hashBytes(bytes.data(), bytes.size())};
+        STIPPLE_TRY(file_.append(bytes.data(), bytes.size()));
+        return section;
     };
-    STIPPLE_TRY(write(tables.nodes.data(), tables.nodes.size(), head.nodes));
-    STIPPLE_TRY(write(tables.counts.data(), tables.counts.size(), head.counts));
-    STIPPLE_TRY(write(text.data(), text.size(), head.description));
-    const std::vector<uint8_t> mesh = meshBytes(h);
-    STIPPLE_TRY(write(mesh.data(), mesh.size(), head.mesh));
-    STIPPLE_TRY(write(tables.payloads.data(), tables.payloads.size(), head.payloads));
+    STIPPLE_ASSIGN(head.nodes, writePages(h, log2PageNodes, write));
+    STIPPLE_ASSIGN(head.description, write(text));
+    STIPPLE_ASSIGN(head.mesh, write(meshBytes(h)));
     head.magic = kMagic;
     head.version = kStoreVersion;
     moveHead(h, head, kToDisk);
     head.nodeCount = h.nodes.size();
     head.fileBytes = file_.position() + sizeof(Foot);
-    // The table of payloads holds the hash of every stream, so these stand for the whole content.
+    // Pages hold the hash of every stream, and their directory that of every page: these stand for the whole content.
     // Names of files are no content.
     StoreDescription nameless = description;
     nameless.source.clear();
     const std::string content = describeAsText(nameless);
-    const std::array<uint64_t, 8> parts{head.nodes.hash,
-                                        head.counts.hash,
-                                        hashBytes(content.data(), content.size()),
-                                        head.mesh.hash,
-                                        head.payloads.hash,
-                                        head.rootLog2,
-                                        std::bit_cast<uint64_t>(head.unit),
-                                        hashBytes(head.origin.data(), sizeof(head.origin))};
+    const std::array<uint64_t, 6> parts{
+        head.nodes.hash, hashBytes(content.data(), content.size()), head.mesh.hash,
+        head.rootLog2,   std::bit_cast<uint64_t>(head.unit),        hashBytes(head.origin.data(), sizeof(head.origin))};
     head.contentHash = contentHash_ = hashBytes(parts.data(), sizeof(parts));
     head.hash = hashBytes(&head, offsetof(Head, hash));
     const Foot foot{head.hash, kFootMagic};
@@ -114,6 +107,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
 
 namespace {
 
+bool hasPages(const Head& head) { return head.version == kStoreVersion; }
 bool hasPayloadsInNodes(const Head& head) { return head.version == kOldVersion || head.version == kOldWideMeshVersion; }
 
 /// The head, with its hash and the foot's checked; of old versions what they do not have is empty.
@@ -128,7 +122,7 @@ Result<Head> readHead(const ByteSource& file) {
         return fail(ErrorKind::input, "is not a stipple store", path,
                     "build one with: stipple build INPUT -o SCENE.stipple");
     const bool isOld = hasPayloadsInNodes(head);
-    if (head.version != kStoreVersion && head.version != kVersionBefore && !isOld)
+    if (!hasPages(head) && head.version != kUnpagedVersion && head.version != kVersionBefore && !isOld)
         return fail(ErrorKind::input,
                     fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion),
                     path, "build it again with this program");
@@ -150,7 +144,7 @@ Result<Head> readHead(const ByteSource& file) {
     const uint64_t nodeBytes = isOld ? sizeof(OldNodeOnDisk) : sizeof(NodeOnDisk);
     if (!(head.unit > 0) || !std::isfinite(head.unit) || !(head.smallestError > 0) || head.rootLog2 > 62 ||
         head.nodeCount == 0 || head.nodeCount > file.sizeBytes() / kFewestChunkBytes ||
-        head.nodes.rawBytes != head.nodeCount * nodeBytes || head.isGraph > 1)
+        (!hasPages(head) && head.nodes.rawBytes != head.nodeCount * nodeBytes) || head.isGraph > 1)
         return damaged("the head holds values that are not possible");
     return head;
 }
@@ -175,10 +169,25 @@ std::string tellSourceCodes(double lattice, Hierarchy& h) {
     return "";
 }
 
-/// The tables of nodes and payloads, and the description.
-Result<void> readTables(const ByteSource& file, const Head& head, Store& store) {
+Result<void> readDescription(const ByteSource& file, const Head& head, Store& store) {
+    STIPPLE_ASSIGN(const std::vector<uint8_t> text, readSection(file, head.description, kMostText, "description"));
+    try {
+        store.description = descriptionFromText({text.begin(), text.end()});
+    } catch (const std::exception& e) {
+        return tl::unexpected(damagedStore(store.path, fmt::format("the description cannot be read: {}", e.what())));
+    }
+    return {};
+}
+
+/// Bytes of textures and tiles, at most: each tile stands for bytes of the file.
+uint64_t mostTextureBytes(const ByteSource& file) {
+    return sizeof(MeshHead) +
+           file.sizeBytes() / kFewestChunkBytes * (sizeof(TextureTile) + sizeof(shared::TextureInfo));
+}
+
+/// The tables of nodes and payloads, of versions before 10, and the description.
+Result<void> readOldTables(const ByteSource& file, const Head& head, Store& store) {
     Hierarchy& h = store.hierarchy;
-    moveHead(h, head, kFromDisk);
     const bool isOld = hasPayloadsInNodes(head);
     bool hasCounts = true;
     if (isOld) {
@@ -186,22 +195,15 @@ Result<void> readTables(const ByteSource& file, const Head& head, Store& store) 
     } else {
         STIPPLE_TRY(readNodes(file, head, h));
     }
-    STIPPLE_ASSIGN(const std::vector<uint8_t> text, readSection(file, head.description, kMostText, "description"));
-    // Every group, run and parent stands for triangles, every tile for bytes of the file.
+    STIPPLE_TRY(readDescription(file, head, store));
+    // Every group, run and parent stands for triangles.
     uint64_t triangles = 0;
     for (uint32_t n = 0; n < h.nodes.size(); ++n)
         h.forEachPayload(n, [&](uint32_t chunk) { triangles += h.payload(chunk).records; });
     const uint64_t payloads = h.nodes.size() + h.further.size();
-    const uint64_t mostMesh =
-        sizeof(MeshHead) + payloads * sizeof(MeshGroup) + triangles * (sizeof(MeshRun) + 8) +
-        file.sizeBytes() / kFewestChunkBytes * (sizeof(TextureTile) + sizeof(shared::TextureInfo));
+    const uint64_t mostMesh = mostTextureBytes(file) + payloads * sizeof(MeshGroup) + triangles * (sizeof(MeshRun) + 8);
     STIPPLE_ASSIGN(const std::vector<uint8_t> mesh, readSection(file, head.mesh, mostMesh, "mesh groups"));
-    try {
-        store.description = descriptionFromText({text.begin(), text.end()});
-    } catch (const std::exception& e) {
-        return tl::unexpected(damagedStore(store.path, fmt::format("the description cannot be read: {}", e.what())));
-    }
-    STIPPLE_TRY(readMesh(mesh, store.path, h));
+    STIPPLE_TRY(readMesh(mesh, store.path, true, h));
     if (!isOld) return {};
     h.isGraph = !h.groups.empty();
     if (h.isGraph && store.description.isCurves)
@@ -213,35 +215,81 @@ Result<void> readTables(const ByteSource& file, const Head& head, Store& store) 
     return {};
 }
 
-}  // namespace
-
-Result<Store> openStore(const std::string& path) {
-    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
-    return openStore(std::make_shared<const InputFile>(std::move(opened)));
+/// What follows from all nodes.
+Result<void> describeNodes(Store& store) {
+    Hierarchy& h = store.hierarchy;
+    for (const Node& n : h.nodes) {
+        if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
+        h.hasMaterials = h.hasMaterials || (n.kind == Kind::patches && store.description.pointMaterials.size() > 1);
+    }
+    const std::string fault = tellSourceCodes(store.description.roundingUnits / h.unit, h);
+    return fault.empty() ? Result<void>() : Result<void>(tl::unexpected(damagedStore(store.path, fault)));
 }
 
-Result<Store> openStore(std::shared_ptr<const ByteSource> source) {
+/// The table of a store with pages, and the description; where streams end.
+Result<uint64_t> readPagedTables(const Head& head, Tables tables, Store& store) {
+    Hierarchy& h = store.hierarchy;
+    STIPPLE_TRY(readDescription(*store.file, head, store));
+    h.isStochastic = store.description.isStochastic;
+    STIPPLE_ASSIGN(const std::vector<uint8_t> mesh,
+                   readSection(*store.file, head.mesh, mostTextureBytes(*store.file), "textures"));
+    STIPPLE_TRY(readMesh(mesh, store.path, false, h));
+    STIPPLE_ASSIGN(store.pages, NodePages::open(store.file, head, h.isGraph));
+    NodePages& pages = *store.pages;
+    if (tables == Tables::whole || h.isGraph || h.isStochastic || pages.count() == 1) {
+        STIPPLE_TRY(pages.readAll(h));
+        describeKinds(h);
+        if (((pages.flags() & kTableMixed) != 0) != h.isMixed)
+            return tl::unexpected(damagedStore(store.path, "is not of the kind that it says it is"));
+        const uint64_t end = pages.chunksEnd();
+        store.pages = nullptr;
+        return end;
+    }
+    const double source = store.description.roundingUnits / h.unit;
+    h.hasOneSourceCode = (pages.flags() & kTableOneSourceCode) != 0;
+    if (h.hasOneSourceCode && !(source <= h.errors.decode(ErrorScale::kLargest)))
+        return tl::unexpected(damagedStore(store.path, "no leaf can be as far from the source as it says"));
+    h.isMixed = (pages.flags() & kTableMixed) != 0;
+    pages.prepare(h, h.hasOneSourceCode ? static_cast<uint8_t>(h.errors.encodeUp(source)) : uint8_t{0});
+    STIPPLE_TRY(pages.load(h, 0));
+    h.isCurves = !h.isMixed && h.nodes[0].kind == Kind::curves;
+    return pages.chunksEnd();
+}
+
+}  // namespace
+
+Result<Store> openStore(const std::string& path, Tables tables) {
+    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    return openStore(std::make_shared<const InputFile>(std::move(opened)), tables);
+}
+
+Result<Store> openStore(std::shared_ptr<const ByteSource> source, Tables tables) {
     const std::string path = source->path();
     Store store;
     store.path = path;
     store.file = std::move(source);
     STIPPLE_ASSIGN(const Head head, readHead(*store.file));
-    STIPPLE_TRY(readTables(*store.file, head, store));
     Hierarchy& h = store.hierarchy;
+    moveHead(h, head, kFromDisk);
+    uint64_t chunksEnd = head.nodes.offset;
+    if (hasPages(head)) {
+        STIPPLE_ASSIGN(chunksEnd, readPagedTables(head, tables, store));
+    } else {
+        STIPPLE_TRY(readOldTables(*store.file, head, store));
+    }
     h.isRigid = store.description.isRigid;
     h.isStochastic = store.description.isStochastic;
     h.hasMaterials = materialAttribute(store.description).has_value();
-    for (const Node& n : h.nodes)
-        if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
-    for (const Node& n : h.nodes)
-        h.hasMaterials = h.hasMaterials || (n.kind == Kind::patches && store.description.pointMaterials.size() > 1);
-    if (const std::string fault = tellSourceCodes(store.description.roundingUnits / h.unit, h); !fault.empty())
-        return tl::unexpected(damagedStore(path, fault));
+    if (h.known.isWhole()) {
+        STIPPLE_TRY(describeNodes(store));
+    } else if ((store.pages->flags() & kTablePatches) != 0) {
+        h.hasMaterials = h.hasMaterials || store.description.pointMaterials.size() > 1;
+    }
     h.discFactors = store.description.discFactors;
     h.smallestDisc = store.description.smallestDisc / h.unit;
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
-    STIPPLE_TRY(checkTables(store, head.nodes.offset));
+    STIPPLE_TRY(checkTables(store, chunksEnd));
     if (!h.groups.empty() && store.description.materials.empty()) {  // it is drawn with a plain one
         shared::SurfaceMaterial& plain = store.description.materials.emplace_back();
         plain.baseColour = {1, 1, 1};
@@ -250,7 +298,15 @@ Result<Store> openStore(std::shared_ptr<const ByteSource> source) {
     return store;
 }
 
+Result<void> readWholeTable(const Store& store) {
+    if (!store.pages) return {};
+    for (uint32_t page = 0; page < store.pages->count(); ++page) STIPPLE_TRY(store.pages->load(store.hierarchy, page));
+    return {};
+}
+
 Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
+    if (const Hierarchy& h = store.hierarchy; h.isUnknown(index))
+        STIPPLE_TRY(store.pages->load(h, h.known.pageOf(index)));
     const ChunkPlace place = chunkPlace(store.hierarchy, index);
     thread_local std::vector<uint8_t> bytes;
     bytes.resize(place.bytes);

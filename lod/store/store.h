@@ -17,10 +17,12 @@
 namespace stipple::lod {
 
 /// Of the file format; a store of another version must be built again.
-inline constexpr uint32_t kStoreVersion = 9;
+inline constexpr uint32_t kStoreVersion = 10;
 /// Still read: with one payload a node; such meshes whose coordinates have more than 30 bits; without spacings of
-/// records (or with them, and taken for damaged by programs of then).
-inline constexpr uint32_t kOldVersion = 6, kOldWideMeshVersion = 7, kVersionBefore = 8;
+/// records (or with them, and taken for damaged by programs of then); without pages of nodes.
+inline constexpr uint32_t kOldVersion = 6, kOldWideMeshVersion = 7, kVersionBefore = 8, kUnpagedVersion = 9;
+
+class NodePages;  // pages.h
 
 /// An opened store. Reading chunks is safe from several threads.
 struct Store {
@@ -30,7 +32,11 @@ struct Store {
     uint64_t fileBytes = 0;
     std::string path;
     std::shared_ptr<const ByteSource> file;
+    std::shared_ptr<NodePages> pages;  ///< of a table that is read as it is needed; such a store is not copied
 };
+
+/// Nodes of a page of the table: 2^10, about 60 kB.
+inline constexpr uint32_t kLog2PageNodes = 10;
 
 class StoreWriter {
   public:
@@ -45,7 +51,9 @@ class StoreWriter {
     /// Appends chunks that are encoded and described already; returns where they begin.
     Result<uint64_t> appendEncoded(const std::vector<uint8_t>& bytes);
     /// Writes node table, description, foot, then the head. The file stays under its temporary name.
-    Result<void> finish(const Hierarchy& hierarchy, const StoreDescription& description);
+    /// `log2PageNodes`: nodes of a page of the table.
+    Result<void> finish(const Hierarchy& hierarchy, const StoreDescription& description,
+                        uint32_t log2PageNodes = kLog2PageNodes);
     const std::string& temporaryPath() const { return file_.temporaryPath(); }
     uint64_t contentHash() const { return contentHash_; }
     uint64_t bytes() const { return file_.position(); }
@@ -57,10 +65,15 @@ class StoreWriter {
     uint64_t contentHash_ = 0;
 };
 
+/// How much of a node table is read when a store is opened: all of it, or the first page, as far as a store has pages
+/// (trees that are no stochastic points, from version 10 on). Those who walk along all nodes need all.
+enum class Tables : uint8_t { whole, asNeeded };
 /// Reads and checks head, foot, node table and description (not the chunks).
-Result<Store> openStore(const std::string& path);
+Result<Store> openStore(const std::string& path, Tables tables = Tables::whole);
 /// Of bytes that are a .stipple file, wherever they are.
-Result<Store> openStore(std::shared_ptr<const ByteSource> source);
+Result<Store> openStore(std::shared_ptr<const ByteSource> source, Tables tables = Tables::whole);
+/// Reads what is not there of the node table, so that all nodes can be walked along.
+Result<void> readWholeTable(const Store& store);
 /// Where a chunk lies in the file.
 struct ChunkPlace {
     uint64_t offset, hash;

@@ -1,7 +1,5 @@
 #include "lod/store/surfel_weights.h"
 
-#include <algorithm>
-
 #include "lod/store/attributes.h"
 
 namespace stipple::lod {
@@ -27,8 +25,9 @@ const Stream* weightsOf(const Hierarchy& h, uint32_t chunk) {
 }
 
 bool hasWeights(const Hierarchy& h) {
-    return std::any_of(h.streams.begin(), h.streams.end(),
-                       [](const Stream& s) { return s.id == StreamId::surfelWeights; });
+    bool has = false;
+    h.forEachPayload(0, [&](uint32_t chunk) { has = has || weightsOf(h, chunk) != nullptr; });
+    return has;
 }
 
 std::vector<uint8_t> encodeWeights(const std::vector<uint8_t>& codes) { return encodeAttributes(oneByte(), {codes}); }

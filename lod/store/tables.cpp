@@ -67,22 +67,6 @@ void appendPairs(const Hierarchy& h, const CodeCounts& c, uint32_t records, std:
     }
 }
 
-template <typename T>
-void appendArray(const std::vector<T>& from, std::vector<uint8_t>& to) {
-    const size_t at = to.size();
-    to.resize(at + from.size() * sizeof(T));
-    if (!from.empty()) std::memcpy(to.data() + at, from.data(), from.size() * sizeof(T));
-}
-
-/// `count` values of T from `at` on, which moves behind them.
-template <typename T>
-std::vector<T> takeArray(const uint8_t*& at, uint64_t count) {
-    std::vector<T> out(count);
-    if (count > 0) std::memcpy(static_cast<void*>(out.data()), at, count * sizeof(T));
-    at += count * sizeof(T);
-    return out;
-}
-
 NameOnDisk nameOnDisk(const char* text) {
     NameOnDisk name{};
     std::memcpy(name.data(), text, std::min(std::strlen(text), name.size() - 1));
@@ -114,7 +98,7 @@ Result<std::vector<Value>> valuesOf(const std::vector<NameOnDisk>& names, size_t
 
 /// The counts per code of one payload, from pairs[used] on.
 Result<void> readCounts(const std::vector<CodeCount>& pairs, uint32_t parentCodes, uint32_t ownCodes, size_t node,
-                        const std::string& path, uint64_t& used, Payload& p, Hierarchy& h) {
+                        const std::string& path, uint64_t& used, Payload& p, std::vector<uint32_t>& greaterThan) {
     for (const auto& [count, counts] : {std::pair{parentCodes, &p.parentCounts}, std::pair{ownCodes, &p.ownCounts}}) {
         uint64_t sum = 0;
         bool rising = count > 0 && used + count <= pairs.size();
@@ -124,7 +108,7 @@ Result<void> readCounts(const std::vector<CodeCount>& pairs, uint32_t parentCode
         }
         if (!rising || sum != p.records)
             return tl::unexpected(damagedStore(path, fmt::format("the code counts of node {} are not possible", node)));
-        *counts = makeCounts(&pairs[used], count, h.greaterThan);
+        *counts = makeCounts(&pairs[used], count, greaterThan);
         used += count;
     }
     return {};
@@ -146,12 +130,12 @@ Result<std::vector<CodeCount>> readPairs(const ByteSource& file, const Head& hea
 
 /// Where what is in a payload's streams lies.
 Result<void> placeStreams(const std::vector<StreamOnDisk>& streams, uint64_t first, uint32_t count, size_t node,
-                          const std::string& path, Payload& p, Hierarchy& h) {
+                          const std::string& path, Payload& p, std::vector<Stream>& further) {
     const auto bad = [&](const char* what) {
         return tl::unexpected(damagedStore(path, fmt::format("node {}: {}", node, what)));
     };
     p.attributeHash = hashBytes(nullptr, 0);
-    p.firstStream = static_cast<uint32_t>(h.streams.size());
+    p.firstStream = static_cast<uint32_t>(further.size());
     const Stream *records = nullptr, *attributes = nullptr;
     std::array<Stream, kMostStreams> all{};
     for (uint32_t k = 0; k < count; ++k) {
@@ -164,9 +148,9 @@ Result<void> placeStreams(const std::vector<StreamOnDisk>& streams, uint64_t fir
         else if (s.id == StreamId::attributes)
             attributes = &s;
         else
-            h.streams.push_back(s);
+            further.push_back(s);
     }
-    p.streams = static_cast<uint32_t>(h.streams.size()) - p.firstStream;
+    p.streams = static_cast<uint32_t>(further.size()) - p.firstStream;
     if (records == nullptr) return bad("a payload has no records");
     p.chunkOffset = records->offset;
     p.chunkHash = records->hash;
@@ -178,16 +162,8 @@ Result<void> placeStreams(const std::vector<StreamOnDisk>& streams, uint64_t fir
     return {};
 }
 
-/// All that the section of payloads holds.
-struct PayloadSection {
-    std::vector<Kind> kinds;
-    std::vector<Codec> codecs;
-    std::vector<PayloadOnDisk> payloads;
-    std::vector<StreamOnDisk> streams;
-};
-
-Result<PayloadSection> readPayloads(const ByteSource& file, const Head& head, uint64_t count) {
-    constexpr uint64_t kMostNames = 64;
+/// The section of payloads: `part` gets payloads and streams.
+Result<Names> readPayloads(const ByteSource& file, const Head& head, uint64_t count, PartOnDisk& part) {
     const uint64_t most = sizeof(PayloadHead) + kMostNames * sizeof(NameOnDisk) +
                           count * (sizeof(PayloadOnDisk) + kMostStreams * sizeof(StreamOnDisk));
     STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readSection(file, head.payloads, most, "payloads"));
@@ -202,22 +178,32 @@ Result<PayloadSection> readPayloads(const ByteSource& file, const Head& head, ui
             bytes.size())
         return bad();
     const uint8_t* at = bytes.data() + sizeof(of);
-    PayloadSection out;
-    const auto kinds = takeArray<NameOnDisk>(at, of.kinds), codecs = takeArray<NameOnDisk>(at, of.codecs);
-    STIPPLE_ASSIGN(out.kinds, valuesOf<Kind>(kinds, kKinds, "kind", file.path()));
-    STIPPLE_ASSIGN(out.codecs, valuesOf<Codec>(codecs, kCodecs, "codec", file.path()));
-    out.payloads = takeArray<PayloadOnDisk>(at, of.payloads);
-    out.streams = takeArray<StreamOnDisk>(at, of.streams);
-    uint64_t streams = 0;
-    for (const PayloadOnDisk& p : out.payloads) {
-        if (p.kind >= out.kinds.size() || p.codec >= out.codecs.size() || p.streams > kMostStreams) return bad();
-        streams += p.streams;
-    }
-    if (streams != out.streams.size()) return bad();
+    STIPPLE_ASSIGN(Names names, readNames(at, of.kinds, of.codecs, file.path()));
+    at += (of.kinds + of.codecs) * sizeof(NameOnDisk);
+    part.payloads = takeArray<PayloadOnDisk>(at, of.payloads);
+    part.streams = takeArray<StreamOnDisk>(at, of.streams);
+    return names;
+}
+
+}  // namespace
+
+Result<Names> readNames(const uint8_t* at, uint64_t kinds, uint64_t codecs, const std::string& path) {
+    const auto ofKinds = takeArray<NameOnDisk>(at, kinds), ofCodecs = takeArray<NameOnDisk>(at, codecs);
+    Names names;
+    STIPPLE_ASSIGN(names.kinds, valuesOf<Kind>(ofKinds, kKinds, "kind", path));
+    STIPPLE_ASSIGN(names.codecs, valuesOf<Codec>(ofCodecs, kCodecs, "codec", path));
+    return names;
+}
+
+std::vector<uint8_t> namesOnDisk() {
+    std::vector<NameOnDisk> names;
+    for (size_t k = 0; k < kKinds; ++k) names.push_back(nameOnDisk(traitsOf(static_cast<Kind>(k)).name));
+    for (size_t c = 0; c < kCodecs; ++c) names.push_back(nameOnDisk(traitsOf(static_cast<Codec>(c)).name));
+    std::vector<uint8_t> out;
+    appendArray(names, out);
     return out;
 }
 
-/// Which payloads are of which kind.
 void describeKinds(Hierarchy& h) {
     bool isOne = h.further.empty();
     for (const Node& n : h.nodes) isOne = isOne && n.kind == h.nodes[0].kind;
@@ -232,53 +218,110 @@ void describeKinds(Hierarchy& h) {
     }
 }
 
+namespace {
+
+/// Do the arrays have as much as the payloads say?
+Result<void> checkPart(const PartOnDisk& part, uint64_t payloads, const Names& names, bool isGraph,
+                       const std::string& path) {
+    const auto bad = [&](const char* what) { return tl::unexpected(damagedStore(path, what)); };
+    if (part.payloads.size() != payloads) return bad("the payloads are not possible");
+    uint64_t streams = 0, codes = 0;
+    for (const PayloadOnDisk& d : part.payloads) {
+        if (d.kind >= names.kinds.size() || d.codec >= names.codecs.size() || d.streams > kMostStreams)
+            return bad("the payloads are not possible");
+        streams += d.streams;
+        if (!isPossibleCount(d.records, d.parentCodes, d.ownCodes, codes) ||
+            (isGraph && d.parentCodes + d.ownCodes > 0))
+            return bad("the code counts are not possible");
+    }
+    if (streams != part.streams.size()) return bad("the payloads are not possible");
+    if (codes < part.pairs.size()) return bad("there are more code counts than nodes");
+    return {};
+}
+
 }  // namespace
+
+Result<TablePart> partInMemory(const PartOnDisk& part, const Names& names, const Places& first, bool isGraph,
+                               const std::string& path) {
+    TablePart out;
+    uint64_t further = 0;
+    for (const NodeOnDisk& d : part.nodes) {
+        Node& n = out.nodes.emplace_back();
+        moveNode(n, d, kFromDisk);
+        if (n.furtherPayloads >= kMostPayloads)
+            return tl::unexpected(damagedStore(path, "a node has more payloads than nodes have"));
+        n.firstFurther = static_cast<uint32_t>(first.further + further);
+        further += n.furtherPayloads;
+    }
+    STIPPLE_TRY(checkPart(part, part.nodes.size() + further, names, isGraph, path));
+    out.further.reserve(further);
+    uint64_t used = 0, stream = 0, payload = 0;
+    auto group = static_cast<uint32_t>(first.groups);
+    const auto read = [&](size_t node, Payload& p) -> Result<void> {
+        const PayloadOnDisk& d = part.payloads[payload++];
+        movePayload(p, d, kFromDisk);
+        p.kind = names.kinds[d.kind];
+        p.codec = names.codecs[d.codec];
+        if (p.kind == Kind::triangles) p.group = group++;
+        STIPPLE_TRY(placeStreams(part.streams, stream, d.streams, node, path, p, out.streams));
+        p.firstStream += static_cast<uint32_t>(first.streams);
+        stream += d.streams;
+        if (isGraph) return {};
+        STIPPLE_TRY(readCounts(part.pairs, d.parentCodes, d.ownCodes, node, path, used, p, out.greaterThan));
+        p.parentCounts.first += static_cast<uint32_t>(first.steps);
+        p.ownCounts.first += static_cast<uint32_t>(first.steps);
+        return {};
+    };
+    for (size_t i = 0; i < out.nodes.size(); ++i) {
+        const uint64_t number = first.nodes + i;
+        STIPPLE_TRY(read(number, out.nodes[i]));
+        for (uint32_t k = 0; k < out.nodes[i].furtherPayloads; ++k) {
+            FurtherPayload& p = out.further.emplace_back();
+            p.node = static_cast<uint32_t>(number);
+            STIPPLE_TRY(read(number, p));
+        }
+    }
+    if (used != part.pairs.size()) return tl::unexpected(damagedStore(path, "there are more code counts than nodes"));
+    out.groups = part.groups;
+    out.runs = part.runs;
+    out.parents = part.parents;
+    out.groupTextures = part.groupTextures;
+    return out;
+}
+
+Places placesAfter(const TablePart& part, const Places& first) {
+    Places after = first;
+    after.nodes += part.nodes.size();
+    after.further += part.further.size();
+    after.streams += part.streams.size();
+    after.steps += part.greaterThan.size();
+    after.groups += part.groups.size();
+    after.runs += part.runs.size();
+    after.parents += part.parents.size();
+    after.groupTextures += part.groupTextures.size();
+    for (const Node& n : part.nodes) after.children += static_cast<uint64_t>(__builtin_popcount(n.childMask));
+    return after;
+}
 
 Result<void> readNodes(const ByteSource& file, const Head& head, Hierarchy& h) {
     STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readSection(file, head.nodes, head.nodes.rawBytes, "node table"));
     const uint8_t* at = bytes.data();
-    h.nodes.resize(head.nodeCount);
-    uint64_t further = 0;
-    for (Node& n : h.nodes) {
-        NodeOnDisk d;
-        std::memcpy(&d, at, sizeof(d));
-        at += sizeof(d);
-        moveNode(n, d, kFromDisk);
-        if (n.furtherPayloads >= kMostPayloads)
-            return tl::unexpected(damagedStore(file.path(), "a node has more payloads than nodes have"));
-        n.firstFurther = static_cast<uint32_t>(further);
-        further += n.furtherPayloads;
-    }
-    if (head.nodeCount + further > file.sizeBytes() / kFewestChunkBytes)
+    PartOnDisk part;
+    part.nodes = takeArray<NodeOnDisk>(at, head.nodeCount);
+    uint64_t payloads = head.nodeCount;
+    for (const NodeOnDisk& d : part.nodes) payloads += d.furtherPayloads;
+    if (payloads > file.sizeBytes() / kFewestChunkBytes)
         return tl::unexpected(damagedStore(file.path(), "it has more payloads than its bytes can hold"));
-    STIPPLE_ASSIGN(const PayloadSection section, readPayloads(file, head, head.nodeCount + further));
+    STIPPLE_ASSIGN(const Names names, readPayloads(file, head, payloads, part));
     uint64_t codes = 0;
-    for (const PayloadOnDisk& d : section.payloads)
-        if (!isPossibleCount(d.records, d.parentCodes, d.ownCodes, codes) ||
-            (h.isGraph && d.parentCodes + d.ownCodes > 0))
-            return tl::unexpected(damagedStore(file.path(), "the code counts are not possible"));
-    STIPPLE_ASSIGN(const std::vector<CodeCount> pairs, readPairs(file, head, codes));
-    h.further.resize(further);
-    uint64_t used = 0, stream = 0, payload = 0;
-    const auto read = [&](size_t node, Payload& p) -> Result<void> {
-        const PayloadOnDisk& d = section.payloads[payload++];
-        movePayload(p, d, kFromDisk);
-        p.kind = section.kinds[d.kind];
-        p.codec = section.codecs[d.codec];
-        STIPPLE_TRY(placeStreams(section.streams, stream, d.streams, node, file.path(), p, h));
-        stream += d.streams;
-        return h.isGraph ? Result<void>() : readCounts(pairs, d.parentCodes, d.ownCodes, node, file.path(), used, p, h);
-    };
-    for (uint32_t i = 0; i < h.nodes.size(); ++i) {
-        Node& n = h.nodes[i];
-        STIPPLE_TRY(read(i, n));
-        for (uint32_t k = 0; k < n.furtherPayloads; ++k) {
-            FurtherPayload& p = h.further[n.firstFurther + k];
-            p.node = i;
-            STIPPLE_TRY(read(i, p));
-        }
-    }
-    if (used != pairs.size()) return tl::unexpected(damagedStore(file.path(), "there are more code counts than nodes"));
+    for (const PayloadOnDisk& d : part.payloads) codes += uint64_t{d.parentCodes} + d.ownCodes;
+    STIPPLE_TRY(checkPart(part, payloads, names, h.isGraph, file.path()));  // before memory is taken for counts
+    STIPPLE_ASSIGN(part.pairs, readPairs(file, head, codes));
+    STIPPLE_ASSIGN(TablePart table, partInMemory(part, names, {}, h.isGraph, file.path()));
+    h.nodes = std::move(table.nodes);
+    h.further = std::move(table.further);
+    h.streams = std::move(table.streams);
+    h.greaterThan = std::move(table.greaterThan);
     describeKinds(h);
     return {};
 }
@@ -302,7 +345,8 @@ Result<bool> readOldNodes(const ByteSource& file, const Head& head, Hierarchy& h
         if (pairs.empty()) continue;
         for (size_t a = 0; a < 3 && n.level > 32 && n.parent < i; ++a)
             n.cell.at(a) |= 2 * h.nodes[n.parent].cell.at(a) >> 32 << 32;
-        STIPPLE_TRY(readCounts(pairs, onDisk[i].parentCodes, onDisk[i].ownCodes, i, file.path(), used, n, h));
+        STIPPLE_TRY(
+            readCounts(pairs, onDisk[i].parentCodes, onDisk[i].ownCodes, i, file.path(), used, n, h.greaterThan));
     }
     if (used != pairs.size()) return tl::unexpected(damagedStore(file.path(), "there are more code counts than nodes"));
     return !pairs.empty();
@@ -313,62 +357,49 @@ void setKindOfAll(Hierarchy& h, Kind kind) {
     describeKinds(h);
 }
 
-TableBytes tablesOf(const Hierarchy& h) {
-    std::vector<NodeOnDisk> nodes;
-    std::vector<CodeCount> pairs;
-    std::vector<PayloadOnDisk> payloads;
-    std::vector<StreamOnDisk> streams;
-    const auto stream = [&](const Stream& s) { moveStream(s, streams.emplace_back(), kToDisk); };
+PartOnDisk partOnDisk(const Hierarchy& h, uint32_t begin, uint32_t end, uint32_t& group) {
+    PartOnDisk out;
+    const auto stream = [&](const Stream& s) { moveStream(s, out.streams.emplace_back(), kToDisk); };
     const auto payload = [&](const Payload& p) {
-        PayloadOnDisk& d = payloads.emplace_back();
+        PayloadOnDisk& d = out.payloads.emplace_back();
         movePayload(p, d, kToDisk);
         d.kind = static_cast<uint8_t>(p.kind);
         d.codec = static_cast<uint8_t>(p.codec);
-        const size_t before = streams.size();
+        const size_t before = out.streams.size();
         stream({p.chunkOffset, p.chunkHash, p.chunkBytes, StreamId::records});
         if (p.attributeBytes > 0)
             stream({p.chunkOffset + p.chunkBytes, p.attributeHash, p.attributeBytes, StreamId::attributes});
         for (uint32_t k = 0; k < p.streams; ++k) stream(h.streams[p.firstStream + k]);
-        d.streams = static_cast<uint16_t>(streams.size() - before);
+        d.streams = static_cast<uint16_t>(out.streams.size() - before);
+        if (p.kind == Kind::triangles) {
+            const MeshGroup& g = out.groups.emplace_back(h.groups.at(group++));
+            const auto append = [](const auto& from, uint32_t first, uint32_t count, auto& to) {
+                to.insert(to.end(), from.begin() + first, from.begin() + first + count);
+            };
+            append(h.runs, g.firstRun, g.runs, out.runs);
+            append(h.parents, g.firstParent, g.parents, out.parents);
+            append(h.groupTextures, g.firstTexture, g.textures, out.groupTextures);
+        }
         if (h.isGraph) return;
-        appendPairs(h, p.parentCounts, p.records, pairs, d.parentCodes);
-        appendPairs(h, p.ownCounts, p.records, pairs, d.ownCodes);
+        appendPairs(h, p.parentCounts, p.records, out.pairs, d.parentCodes);
+        appendPairs(h, p.ownCounts, p.records, out.pairs, d.ownCodes);
     };
-    nodes.reserve(h.nodes.size());
-    payloads.reserve(h.nodes.size() + h.further.size());
-    for (uint32_t n = 0; n < h.nodes.size(); ++n) {
-        moveNode(h.nodes[n], nodes.emplace_back(), kToDisk);
+    for (uint32_t n = begin; n < end; ++n) {
+        moveNode(h.nodes[n], out.nodes.emplace_back(), kToDisk);
         h.forEachPayload(n, [&](uint32_t chunk) { payload(h.payload(chunk)); });
     }
-    std::vector<NameOnDisk> names;
-    for (size_t k = 0; k < kKinds; ++k) names.push_back(nameOnDisk(traitsOf(static_cast<Kind>(k)).name));
-    for (size_t c = 0; c < kCodecs; ++c) names.push_back(nameOnDisk(traitsOf(static_cast<Codec>(c)).name));
-    const std::vector<PayloadHead> head{{kKinds, kCodecs, payloads.size(), streams.size()}};
-    TableBytes out;
-    appendArray(nodes, out.nodes);
-    appendArray(pairs, out.counts);
-    appendArray(head, out.payloads);
-    appendArray(names, out.payloads);
-    appendArray(payloads, out.payloads);
-    appendArray(streams, out.payloads);
     return out;
 }
 
 std::vector<uint8_t> meshBytes(const Hierarchy& h) {
-    const MeshHead head{h.groups.size(),        h.runs.size(),     h.parents.size(),
-                        h.groupTextures.size(), h.textures.size(), h.tiles.size()};
     std::vector<uint8_t> out;
-    appendArray(std::vector{head}, out);
-    appendArray(h.groups, out);
-    appendArray(h.runs, out);
-    appendArray(h.parents, out);
-    appendArray(h.groupTextures, out);
+    appendArray(std::vector{MeshHead{0, 0, 0, 0, h.textures.size(), h.tiles.size()}}, out);
     appendArray(h.textures, out);
     appendArray(h.tiles, out);
     return out;
 }
 
-Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path, Hierarchy& h) {
+Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path, bool hasGroups, Hierarchy& h) {
     MeshHead head{};
     const auto bad = [&] { return tl::unexpected(damagedStore(path, "the groups of the mesh are not possible")); };
     if (bytes.size() < sizeof(head)) return bad();
@@ -380,16 +411,19 @@ Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path
                 head.tiles * sizeof(TextureTile) !=
             bytes.size())
         return bad();
+    if (!hasGroups && head.groups + head.runs + head.parents + head.groupTextures > 0) return bad();
     const uint8_t* at = bytes.data() + sizeof(head);
     const auto take = [&](auto& to, uint64_t count) {
         to.resize(count);
         if (count > 0) std::memcpy(to.data(), at, count * sizeof(to[0]));
         at += count * sizeof(to[0]);
     };
-    take(h.groups, head.groups);
-    take(h.runs, head.runs);
-    take(h.parents, head.parents);
-    take(h.groupTextures, head.groupTextures);
+    if (hasGroups) {
+        take(h.groups, head.groups);
+        take(h.runs, head.runs);
+        take(h.parents, head.parents);
+        take(h.groupTextures, head.groupTextures);
+    }
     take(h.textures, head.textures);
     take(h.tiles, head.tiles);
     return {};

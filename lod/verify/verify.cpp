@@ -74,6 +74,7 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
 }  // namespace
 
 Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_t nodes) {
+    STIPPLE_TRY(readWholeTable(store));
     const Hierarchy& h = store.hierarchy;
     // Of a sample of nodes a sample of their discs is held against the leaves.
     const uint64_t discs = nodes == 0 ? std::numeric_limits<uint64_t>::max() : 64;

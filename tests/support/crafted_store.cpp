@@ -40,37 +40,61 @@ Section pack(std::vector<uint8_t>& out, const void* from, size_t count, uint64_t
     return s;
 }
 
-template <typename T>
-void copyArray(std::vector<T>& to, const std::vector<uint8_t>& raw) {
-    to.resize(raw.size() / sizeof(T));
-    if (!to.empty()) std::memcpy(to.data(), raw.data(), to.size() * sizeof(T));
-}
-
 }  // namespace
 
 CraftedStore CraftedStore::read(const std::string& path) {
     const std::string file = slurp(path);
     CraftedStore c;
     std::memcpy(&c.head, file.data(), sizeof(c.head));
-    copyArray(c.nodes, unpack(file, c.head.nodes));
-    copyArray(c.counts, unpack(file, c.head.counts));
     const std::vector<uint8_t> text = unpack(file, c.head.description);
     c.description.assign(text.begin(), text.end());
-    c.mesh = unpack(file, c.head.mesh);
-    const std::vector<uint8_t> table = unpack(file, c.head.payloads);
-    PayloadHead of{};
-    std::memcpy(&of, table.data(), sizeof(of));
-    size_t at = sizeof(of);
-    const auto take = [&](auto& to, uint64_t count) {
-        to.resize(count);
-        if (count > 0) std::memcpy(to.data(), table.data() + at, count * sizeof(to[0]));
+    const auto takeFrom = [](const std::vector<uint8_t>& raw, size_t& at, auto& to, uint64_t count) {
+        const size_t before = to.size();
+        to.resize(before + count);
+        if (count > 0) std::memcpy(to.data() + before, raw.data() + at, count * sizeof(to[0]));
         at += count * sizeof(to[0]);
     };
-    take(c.kinds, of.kinds);
-    take(c.codecs, of.codecs);
-    take(c.payloads, of.payloads);
-    take(c.streams, of.streams);
-    c.body.assign(file.begin() + sizeof(Head), file.begin() + static_cast<std::ptrdiff_t>(c.head.nodes.offset));
+    const std::vector<uint8_t> directory = unpack(file, c.head.nodes);
+    TableHead table{};
+    std::memcpy(&table, directory.data(), sizeof(table));
+    size_t at = sizeof(table);
+    takeFrom(directory, at, c.kinds, table.kinds);
+    takeFrom(directory, at, c.codecs, table.codecs);
+    std::vector<PageOnDisk> pages;
+    takeFrom(directory, at, pages, table.pages);
+    std::vector<lod::MeshGroup> groups;
+    std::vector<lod::MeshRun> runs;
+    std::vector<uint32_t> parents, groupTextures;
+    for (size_t p = 0; p < pages.size(); ++p) {
+        const std::vector<uint8_t> page = unpack(file, pages[p].section);
+        const Places &first = pages[p].first, &next = p + 1 < pages.size() ? pages[p + 1].first : table.total;
+        PageHead of{};
+        std::memcpy(&of, page.data(), sizeof(of));
+        size_t in = sizeof(of);
+        takeFrom(page, in, c.nodes, next.nodes - first.nodes);
+        takeFrom(page, in, c.payloads, next.nodes - first.nodes + next.further - first.further);
+        takeFrom(page, in, c.streams, of.streams);
+        takeFrom(page, in, c.counts, of.pairs);
+        takeFrom(page, in, groups, next.groups - first.groups);
+        takeFrom(page, in, runs, next.runs - first.runs);
+        takeFrom(page, in, parents, next.parents - first.parents);
+        takeFrom(page, in, groupTextures, next.groupTextures - first.groupTextures);
+    }
+    const std::vector<uint8_t> textures = unpack(file, c.head.mesh);
+    MeshHead mesh{};
+    std::memcpy(&mesh, textures.data(), sizeof(mesh));
+    mesh.groups = groups.size();
+    mesh.runs = runs.size();
+    mesh.parents = parents.size();
+    mesh.groupTextures = groupTextures.size();
+    append(c.mesh, &mesh, sizeof(mesh));
+    append(c.mesh, groups.data(), groups.size() * sizeof(lod::MeshGroup));
+    append(c.mesh, runs.data(), runs.size() * sizeof(lod::MeshRun));
+    append(c.mesh, parents.data(), parents.size() * 4);
+    append(c.mesh, groupTextures.data(), groupTextures.size() * 4);
+    append(c.mesh, textures.data() + sizeof(mesh), textures.size() - sizeof(mesh));
+    c.body.assign(file.begin() + sizeof(Head), file.begin() + static_cast<std::ptrdiff_t>(pages.at(0).section.offset));
+    c.head.version = lod::kUnpagedVersion;  // its sections are those of one page
     return c;
 }
 

@@ -10,7 +10,8 @@
 
 namespace stipple::test {
 
-/// A store taken apart. Change what you like, then write it.
+/// A store taken apart. Change what you like, then write it: as version 9, which has one section for all nodes (of
+/// pages: tests/unit/pages_test.cpp).
 struct CraftedStore {
     lod::layout::Head head{};  ///< lengths, places and hashes are computed anew, but for what `keep` names
     std::vector<lod::layout::NodeOnDisk> nodes;

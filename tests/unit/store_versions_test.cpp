@@ -21,7 +21,7 @@ struct Golden {
     size_t nodes;
     uint64_t records, table;  ///< hashes of what is decoded
 };
-constexpr std::array<Golden, 11> kGoldens{
+constexpr std::array<Golden, 13> kGoldens{
     {{"points", 6, Kind::points, 11, 0x5303292940de763c, 0x20af3ef2c3f273ac},
      {"progressive", 6, Kind::points, 1, 0xa8c37fef9aee0c9f, 0x17357675d06252b0},
      {"curves", 6, Kind::curves, 29, 0xb99341d7983e2135, 0xf4bf98ee1b06cb81},
@@ -33,7 +33,10 @@ constexpr std::array<Golden, 11> kGoldens{
      {"curves", 8, Kind::curves, 29, 0xb99341d7983e2135, 0xf4bf98ee1b06cb81},
      {"triangles", 8, Kind::triangles, 4, 0x5717fdad8f22f3ff, 0x20867ccfa0f04b85},
      {"mixed", 8, Kind::points, 5, 0x2e3c1d599b4d832e, 0x9c981823682b3036},
-     {"points", 9, Kind::points, 49, 0x32465146638ea3da, 0xe56074fae192a5a1}}};
+     {"points", 9, Kind::points, 49, 0x32465146638ea3da, 0xe56074fae192a5a1},
+     // In pages of two nodes.
+     {"points", 10, Kind::points, 49, 0x32465146638ea3da, 0xe56074fae192a5a1},
+     {"mixed", 10, Kind::points, 5, 0x2e3c1d599b4d832e, 0x9c981823682b3036}}};
 
 std::string pathOf(const Golden& g) {
     return std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/stores/" + g.name + "_" + std::to_string(g.version) +
@@ -61,7 +64,7 @@ TEST(StoreVersions, OldBytesOpenAndHoldWhatTheyHeld) {
         EXPECT_TRUE(report) << report.error().line();
     }
     // A new version comes with its own bytes.
-    EXPECT_EQ(versions, (std::set<uint32_t>{kOldVersion, kOldWideMeshVersion, kVersionBefore, kStoreVersion}));
+    EXPECT_EQ(versions, (std::set<uint32_t>{kOldVersion, kOldWideMeshVersion, kVersionBefore, kUnpagedVersion, kStoreVersion}));
 }
 
 // Of build version 11: records know how far apart they lie, have weights, and name materials.

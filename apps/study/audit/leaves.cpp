@@ -79,6 +79,7 @@ struct Leaves {
 Result<FullShapes> leavesOf(std::span<const render::PlacedStore> placed, size_t most) {
     FullShapes shapes;
     for (const render::PlacedStore& p : placed) {
+        STIPPLE_TRY(lod::readWholeTable(*p.store));
         const lod::Hierarchy& h = p.store->hierarchy;
         Leaves leaves{*p.store, p.place, shapes};
         for (uint32_t n = 0; n < h.nodes.size(); ++n) {

@@ -23,6 +23,7 @@ struct Kept {
 };
 
 Result<std::vector<Kept>> keptOf(const lod::Store& store) {
+    STIPPLE_TRY(lod::readWholeTable(store));
     std::vector<Kept> all;
     const lod::Hierarchy& h = store.hierarchy;
     for (uint32_t n = 0; n < h.nodes.size(); ++n) {

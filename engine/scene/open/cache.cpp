@@ -229,8 +229,8 @@ class Lookup {
 
 }  // namespace
 
-Result<StorePtr> openStoreFile(const std::string& path) {
-    STIPPLE_ASSIGN(lod::Store store, lod::openStore(path));
+Result<StorePtr> openStoreFile(const std::string& path, lod::Tables tables) {
+    STIPPLE_ASSIGN(lod::Store store, lod::openStore(path, tables));
     return std::make_shared<const lod::Store>(std::move(store));
 }
 

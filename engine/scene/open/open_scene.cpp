@@ -299,7 +299,7 @@ Result<void> openSceneFile(const std::string& path, const OpenSettings& options,
         const scene::Node& node = scene.nodes[n];
         if (node.store.empty() || !visible[n]) continue;
         if (open.count(node.store) == 0) {
-            STIPPLE_ASSIGN(open[node.store], openStoreFile(node.store));
+            STIPPLE_ASSIGN(open[node.store], openStoreFile(node.store, lod::Tables::asNeeded));
         }
         std::vector<glm::dmat4> places = node.instances;
         if (places.empty()) places.emplace_back(1);
@@ -429,7 +429,7 @@ namespace {
 /// The stores of inputs that are no scene file.
 Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::string>& inputs, const OpenSettings& build,
                                                     Executor& executor) {
-    if (lod::isStoreFile(inputs.front())) return openStoreFile(inputs.front());
+    if (lod::isStoreFile(inputs.front())) return openStoreFile(inputs.front(), lod::Tables::asNeeded);
     if (inputs.size() == 1 && lod::isCurveFile(inputs[0]) && build.surfels > 0) return nothingToSample(inputs[0]);
     if (inputs.size() == 1 && lod::isCurveFile(inputs[0]))
         return openCached(inputs, build, "curves", [&](const std::string& path, Progress& progress) {
