@@ -373,8 +373,12 @@ PartOnDisk partOnDisk(const Hierarchy& h, uint32_t begin, uint32_t end, uint32_t
         d.streams = static_cast<uint16_t>(out.streams.size() - before);
         if (p.kind == Kind::triangles) {
             const MeshGroup& g = out.groups.emplace_back(h.groups.at(group++));
-            const auto append = [](const auto& from, uint32_t first, uint32_t count, auto& to) {
-                to.insert(to.end(), from.begin() + first, from.begin() + first + count);
+            // (Of what is not there nothing: whoever reads it finds that groups have more than there is.)
+            const auto append = [](const auto& from, uint64_t first, uint64_t count, auto& to) {
+                const auto at = [&](uint64_t i) {
+                    return from.begin() + static_cast<std::ptrdiff_t>(std::min<uint64_t>(i, from.size()));
+                };
+                to.insert(to.end(), at(first), at(first + count));
             };
             append(h.runs, g.firstRun, g.runs, out.runs);
             append(h.parents, g.firstParent, g.parents, out.parents);
