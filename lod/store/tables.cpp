@@ -220,6 +220,10 @@ void describeKinds(Hierarchy& h) {
 
 namespace {
 
+tl::unexpected<Error> tooManyPayloads(const std::string& path) {
+    return tl::unexpected(damagedStore(path, "a node has more payloads than nodes have"));
+}
+
 /// Do the arrays have as much as the payloads say?
 Result<void> checkPart(const PartOnDisk& part, uint64_t payloads, const Names& names, bool isGraph,
                        const std::string& path) {
@@ -248,8 +252,7 @@ Result<TablePart> partInMemory(const PartOnDisk& part, const Names& names, const
     for (const NodeOnDisk& d : part.nodes) {
         Node& n = out.nodes.emplace_back();
         moveNode(n, d, kFromDisk);
-        if (n.furtherPayloads >= kMostPayloads)
-            return tl::unexpected(damagedStore(path, "a node has more payloads than nodes have"));
+        if (n.furtherPayloads >= kMostPayloads) return tooManyPayloads(path);
         n.firstFurther = static_cast<uint32_t>(first.further + further);
         further += n.furtherPayloads;
     }
@@ -309,7 +312,10 @@ Result<void> readNodes(const ByteSource& file, const Head& head, Hierarchy& h) {
     PartOnDisk part;
     part.nodes = takeArray<NodeOnDisk>(at, head.nodeCount);
     uint64_t payloads = head.nodeCount;
-    for (const NodeOnDisk& d : part.nodes) payloads += d.furtherPayloads;
+    for (const NodeOnDisk& d : part.nodes) {
+        if (d.furtherPayloads >= kMostPayloads) return tooManyPayloads(file.path());
+        payloads += d.furtherPayloads;
+    }
     if (payloads > file.sizeBytes() / kFewestChunkBytes)
         return tl::unexpected(damagedStore(file.path(), "it has more payloads than its bytes can hold"));
     STIPPLE_ASSIGN(const Names names, readPayloads(file, head, payloads, part));
