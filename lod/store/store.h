@@ -35,7 +35,7 @@ struct Store {
     std::shared_ptr<NodePages> pages;  ///< of a table that is read as it is needed; such a store is not copied
 };
 
-/// Nodes of a page of the table: 2^10, about 60 kB.
+/// Nodes of a page of the table: 2^10, about 100 kB.
 inline constexpr uint32_t kLog2PageNodes = 10;
 
 class StoreWriter {
