@@ -253,6 +253,86 @@ TEST_F(Api, ASourceThatFailsOrBreaksItsWordLeavesNothingBehind) {
     EXPECT_FALSE(fs::exists(at("a.stipple")));
 }
 
+TEST_F(Api, BytesInMemoryBuildTheStoreOfTheFile) {
+    const std::string ball = writeBall("ball.ply"), bytes = bytesOf(ball);
+    ASSERT_TRUE(stipple::build({ball}, at("file.stipple")));
+    fs::remove(ball);
+    const auto built = stipple::buildBytes({{"ball.ply", bytes.data(), bytes.size()}}, at("memory.stipple"));
+    ASSERT_TRUE(built) << built.error().line();
+    EXPECT_EQ(built->kept, 4000u);
+    EXPECT_EQ(bytesOf(at("memory.stipple")), bytesOf(at("file.stipple")));
+    EXPECT_EQ(stipple_build_bytes("ball.ply", bytes.data(), bytes.size(), at("c.stipple").c_str()), 0);
+    EXPECT_EQ(bytesOf(at("c.stipple")), bytesOf(at("file.stipple")));
+    EXPECT_EQ(stipple_build_bytes("ball.ply", nullptr, 3, at("c.stipple").c_str()), 2);
+    EXPECT_EQ(stipple_build_bytes("ball.ply", bytes.data(), 0, at("c.stipple").c_str()), 3);
+    // It is drawn.
+    const auto store = stipple::Store::open(at("memory.stipple"));
+    ASSERT_TRUE(store);
+    const auto scene = stipple::Scene::of({{*store, {}}});
+    ASSERT_TRUE(scene);
+    const auto image = Api::renderer(Api::device(), *scene).render(scene->overview(1), 48, 48);
+    ASSERT_TRUE(image);
+    size_t covered = 0;
+    for (size_t i = 3; i < image->rgba.size(); i += 4) covered += image->rgba[i] > 0 ? 1 : 0;
+    EXPECT_GT(covered, 500u);
+    // Half of it, what is no input, and a store.
+    const auto half = stipple::buildBytes({{"half.ply", bytes.data(), bytes.size() / 2}}, at("half.stipple"));
+    ASSERT_FALSE(half);
+    EXPECT_NE(half.error().line().find("half.ply"), std::string::npos) << half.error().line();
+    EXPECT_FALSE(fs::exists(at("half.stipple")));
+    const auto vdb = stipple::buildBytes({{"a.vdb", "something", 9}}, at("half.stipple"));
+    ASSERT_FALSE(vdb);
+    EXPECT_NE(vdb.error().line().find("a.vdb: is OpenVDB, which is read from files only"), std::string::npos);
+    const std::string whole = bytesOf(at("file.stipple"));
+    EXPECT_FALSE(stipple::buildBytes({{"a.ply", whole.data(), whole.size()}}, at("half.stipple")));
+}
+
+TEST_F(Api, MeshesAndScenesInMemoryBuildTheStoreOfTheFile) {
+    std::ofstream(at("a.ply")) << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                                  "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                                  "end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
+    std::ofstream(at("b.obj")) << "mtllib m.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n";
+    std::ofstream(at("m.mtl")) << "newmtl red\nKd 1 0 0\n";
+    std::ofstream(at("c.swc")) << "1 1 0 0 0 1 -1\n2 3 0 0 1 0.5 1\n3 3 0 0 2 0.5 2\n";
+    for (const std::string name : {"a.ply", "b.obj", "c.swc"}) {
+        SCOPED_TRACE(name);
+        const std::string bytes = bytesOf(at(name)), material = bytesOf(at("m.mtl"));
+        const auto ofFile = stipple::build({at(name)}, at("file.stipple"));
+        ASSERT_TRUE(ofFile) << ofFile.error().line();
+        fs::rename(at(name), at("gone"));
+        const stipple::Resolve resolve = [&](const std::string& wanted) -> stipple::Result<std::vector<uint8_t>> {
+            if (wanted != "m.mtl") return stipple::Error{ErrorKind::input, "is not there", wanted, ""};
+            return std::vector<uint8_t>(material.begin(), material.end());
+        };
+        const std::vector<stipple::Bytes> input{{name, bytes.data(), bytes.size()}};
+        const auto built = stipple::buildBytes(input, at("memory.stipple"), {}, resolve);
+        ASSERT_TRUE(built) << built.error().line();
+        EXPECT_EQ(built->primitive, ofFile->primitive);
+        EXPECT_EQ(bytesOf(at("memory.stipple")), bytesOf(at("file.stipple")));
+        // Without what it names, which lies beside the place where it was, it is another.
+        const auto alone = stipple::buildBytes(input, at("alone.stipple"));
+        ASSERT_TRUE(alone) << alone.error().line();
+        EXPECT_EQ(bytesOf(at("alone.stipple")) == bytesOf(at("file.stipple")), name != "b.obj");
+    }
+}
+
+TEST_F(Api, NamesOfPointsAreNoFiles) {
+    // A folder of scans of that name, seen from where the program runs, is another's.
+    writeBall("ball.ply");
+    const std::string bytes = bytesOf(at("ball.ply"));
+    stipple::PointSource source = grid();
+    source.name = folder_.string();
+    const auto points = stipple::buildPoints(source, at("grid.stipple"));
+    ASSERT_TRUE(points) << points.error().line();
+    EXPECT_EQ(points->in, 8000u);
+    writeBall("other.ply");
+    for (const std::string& name : {folder_.string(), at("*.ply")}) {
+        const auto built = stipple::buildBytes({{name, bytes.data(), bytes.size()}}, at("b.stipple"));
+        ASSERT_TRUE(built) << built.error().line();
+        EXPECT_EQ(built->in, 4000u);
+    }
+}
+
 TEST_F(Api, TheSubsetForCRefusesWhatIsNotThereAndDrawsTheSame) {
     EXPECT_EQ(stipple_device_open("cpu", nullptr), 2);
     EXPECT_NE(std::string(stipple_last_error()), "");
