@@ -86,6 +86,7 @@ void clear(DrawList& out) {
     out.meshDraws.clear();
     out.lights.clear();
     out.environment.reset();
+    out.backdrop.reset();
     out.tables.clear();
     out.layer = nullptr;
     out.glass.reset();

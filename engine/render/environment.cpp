@@ -129,6 +129,13 @@ void addSharpMaps(const HdrImage& image, float scale, Executor& executor, Enviro
 
 }  // namespace
 
+glm::dmat3 environmentAxes(const glm::dvec3& worldUp) {
+    const glm::dvec3 up = glm::normalize(worldUp);
+    const glm::dvec3 aside = std::abs(up.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+    const glm::dvec3 back = glm::normalize(glm::cross(aside, up));
+    return {glm::cross(up, back), up, back};
+}
+
 Environment makeEnvironment(const HdrImage& image, float scale, Executor& executor, bool hasMirrors) {
     Environment out;
     const std::vector<Sample> fine = reduce(image, scale, 256, 128), coarse = reduce(image, scale, 64, 32);

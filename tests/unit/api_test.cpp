@@ -109,6 +109,36 @@ TEST_F(Api, SeveralScenesAndRenderersShareADeviceAndEndInAnyOrder) {
     ASSERT_TRUE(second->render(camera, 64, 64));
 }
 
+TEST_F(Api, AnEnvironmentLightsAndIsSeenBehindWhereThatIsAskedFor) {
+    {
+        std::ofstream out(at("even.hdr"), std::ios::binary);
+        out << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n";
+        for (int i = 0; i < 16 * 8; ++i) out << "\x80\x40\x20\x80";  // 1/2, 1/4, 1/8
+    }
+    const stipple::Scene scene = sceneOf("ball.ply");
+    stipple::Renderer r = renderer(device(), scene);
+    stipple::RenderSettings s;
+    s.wantDepthAndNormal = true;
+    s.environment = at("even.hdr");
+    const auto corner = [&] {
+        const auto image = r.render(scene.overview(1), 64, 64, s);
+        EXPECT_TRUE(image) << image.error().line();
+        return std::vector<float>(image->linear.begin(), image->linear.begin() + 3);
+    };
+    EXPECT_LT(corner()[0], 0.1f) << "the control";
+    s.environmentIsBackground = true;
+    const std::vector<float> behind = corner();
+    for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(behind[k], 0.5f / static_cast<float>(1u << k), 1e-3f);
+    s.environmentScale = 3;
+    EXPECT_NEAR(corner()[0], 1.5f, 3e-3f) << "another scale is another picture";
+    s.environment.clear();
+    const auto none = r.render(scene.overview(1), 64, 64, s);
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().kind, ErrorKind::usage);
+    s.environment = at("none.hdr");
+    EXPECT_FALSE(r.render(scene.overview(1), 64, 64, s));
+}
+
 TEST_F(Api, FramesGoOnUntilNothingIsMissing) {
     const stipple::Scene scene = sceneOf("ball.ply");
     stipple::Renderer r = renderer(device(), scene);

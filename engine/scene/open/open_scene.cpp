@@ -520,6 +520,13 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Open
     return scene;
 }
 
+Result<std::shared_ptr<const render::Backdrop>> openBackdrop(const std::string& path, double scale,
+                                                             uint64_t memoryBytes, Executor& executor) {
+    STIPPLE_ASSIGN(render::HdrImage image, image::readHdr(path, memoryBytes));
+    return std::make_shared<const render::Backdrop>(
+        render::makeBackdrop(std::move(image), static_cast<float>(scale), executor));
+}
+
 Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
                                                                    uint64_t memoryBytes, Executor& executor,
                                                                    bool hasMirrors) {
