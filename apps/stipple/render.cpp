@@ -261,7 +261,8 @@ std::string drawnText(const render::FrameState& state, const ModeOptions& drawn)
 
 /// The result, as text or JSON.
 void tell(const Options& o, const render::FrameState& state, const render::DrawSettings& settings,
-          const Verdict& verdict, const Timings& timings, const glm::uvec2& size, size_t views) {
+          const Verdict& verdict, const Timings& timings, const glm::uvec2& size, const Written& written) {
+    const size_t views = written.of;
     const FrameCounters& c = state.counters;
     if (o.json) {
         nlohmann::json passes = nlohmann::json::array();
@@ -280,6 +281,7 @@ void tell(const Options& o, const render::FrameState& state, const render::DrawS
             {"frame_ms", {{"median", quantile(timings.frames, 0.5)}, {"p95", quantile(timings.frames, 0.95)}}},
             {"passes", passes},
             {"effects", effectsJson(render::effectStatus(state, settings))},
+            {"effect_changes", changesJson(written.walk.changes())},
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
             {"patch_blocks_drawn", patchBlocksOf(state)},
@@ -308,6 +310,7 @@ void tell(const Options& o, const render::FrameState& state, const render::DrawS
         fmt::print("{} pictures; the worst is {}: {}{}, {:.1f} ms a frame on {}\n", views,
                    numbered(o.output, verdict.worst), errorText(verdict, o.drawn.mode), pruningText(verdict.pruned),
                    quantile(timings.frames, 0.5), state.backend->device());
+        fmt::print("{}", changesText(written.walk.changes()));
     } else if (!o.quiet) {
         fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawnText(state, o.drawn),
                    errorText(verdict, o.drawn.mode), pruningText(verdict.pruned), quantile(timings.frames, 0.5),
@@ -377,7 +380,7 @@ Result<void> run(const Options& o, Written& written) {
         drawLegend(legend, state->image);
         STIPPLE_TRY(image::writePicture(o.output, state->image, formatOf(o)));
     }
-    tell(o, *state, settings.draw, verdict, timings, size, shot.views.size());
+    tell(o, *state, settings.draw, verdict, timings, size, written);
     if (!o.quiet) sayShadows(*state);
     if (!o.quiet) sayEmpty(verdict.empty, shot.views.size(), o.output);
     if (!o.quiet && verdict.leavesAround > 0)
