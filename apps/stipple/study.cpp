@@ -26,8 +26,9 @@ Result<void> checkOptions(const CLI::App& sub, const Options& o) {
     if (!o.seeds && o.scenes.scenes.empty())
         return fail(ErrorKind::usage, "says what is to be studied, and is missing", "SCENE",
                     "stipple study SCENE -o FOLDER, or stipple study --seeds -o FOLDER");
-    for (const char* option : {"SCENE", "--full", "--modes", "--errors", "--sizes", "--budgets", "--builds", "--views",
-                               "--camera-path", "--blocks", "--frames", "--seed", "--device", "--resident"})
+    for (const char* option :
+         {"SCENE", "--full", "--modes", "--errors", "--sizes", "--budgets", "--builds", "--views", "--camera-path",
+          "--against", "--blocks", "--frames", "--seed", "--device", "--resident"})
         if (o.seeds && sub.get_option(option)->count() > 0)
             return fail(ErrorKind::usage, "is of studies of scenes, not of --seeds", option, "leave one of them out");
     const char* const everywhere = std::getenv("STIPPLE_DATA");

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "apps/stipple/build_patches.h"
 #include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/mode_options.h"
@@ -21,6 +22,7 @@
 #include "engine/base/units.h"
 #include "engine/image/image_io.h"
 #include "engine/scene/open/scene_facts.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::app {
 namespace {
@@ -105,6 +107,27 @@ Result<void> checkFolder(const std::string& folder) {
     return {};
 }
 
+bool holdsPatches(const lod::Hierarchy& h) {
+    bool found = false;
+    for (uint32_t n = 0; n < h.nodes.size() && !found; ++n)
+        h.forEachPayload(n, [&](uint32_t index) { found = found || h.payload(index).kind == lod::Kind::patches; });
+    return found;
+}
+
+/// The mesh that a store of patches was built from.
+Result<void> readAgainst(const std::string& input, const StudyOptions& o, study::StudyScene& s) {
+    const bool isPatches = s.placed.size() == 1 && holdsPatches(s.placed.front().store->hierarchy);
+    if (!lod::isStoreFile(input) || !isPatches || !hasTriangles(o.against))
+        return fail(ErrorKind::usage, "is the mesh that a built scene of patches was built from",
+                    "--against " + o.against, "give one SCENE, a .stipple store of patches of a mesh");
+    STIPPLE_ASSIGN(const lod::TriangleMesh mesh, readTriangles(o.against, o.build.reading()));
+    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
+        s.against.push_back(
+            {mesh.position[mesh.indices[i]], mesh.position[mesh.indices[i + 1]], mesh.position[mesh.indices[i + 2]]});
+    s.againstName = printable(fs::path(o.against).filename().string());
+    return {};
+}
+
 Result<study::StudyScene> studySceneOf(const std::string& input, const StudyOptions& o, Executor& executor) {
     STIPPLE_ASSIGN(OpenedScene opened, scene::openScene({input}, o.build.told(o.quiet || o.json), executor));
     STIPPLE_ASSIGN(const lod::ColourBy colour, scene::applyColours(opened, "auto", "", ""));
@@ -134,6 +157,7 @@ Result<study::StudyScene> studySceneOf(const std::string& input, const StudyOpti
     }
     s.placed = std::move(opened.placed);
     s.groups = std::move(opened.groups);
+    if (!o.against.empty()) STIPPLE_TRY(readAgainst(input, o, s));
     return s;
 }
 
@@ -177,6 +201,10 @@ void StudyOptions::addTo(CLI::App& sub) {
         ->transform(within(1, 1000));
     sub.add_option("--camera-path", path, "JSON file with a path of your own instead (stipple render --help)")
         ->type_name("FILE");
+    sub.add_option("--against", against,
+                   "the mesh that a .stipple scene of patches was built from: pictures are audited against it, and not "
+                   "against the scene's leaves")
+        ->type_name("FILE");
     sub.add_option("--blocks", blocks,
                    "times that everything is drawn again, in another order; below 6 no two times "
                    "can be told apart")
@@ -214,6 +242,8 @@ Result<void> runSceneStudy(const StudyOptions& o) {
     catchStopSignals();
     STIPPLE_ASSIGN(study::StudySettings settings, settingsOf(o));
     if (!o.path.empty()) STIPPLE_TRY(InputFile::open(o.path));
+    if (!o.against.empty() && (o.scenes.size() != 1 || !o.builds.empty()))
+        return fail(ErrorKind::usage, "is of studies of one scene", "--against", "give one SCENE and no --builds");
     STIPPLE_TRY(checkFolder(o.output));
     STIPPLE_TRY(image::checkModule(true));
     const auto executor = makeTbbExecutor(o.build.threads);

@@ -10,7 +10,7 @@ namespace stipple::app {
 
 struct StudyOptions {
     std::vector<std::string> scenes;
-    std::string output, device = "cpu", resident = "1G", path;
+    std::string output, device = "cpu", resident = "1G", path, against;
     std::vector<std::string> modes, sizes;
     std::vector<double> errors;
     std::vector<std::string> budgets;  ///< empty: as many as --quick and --full say

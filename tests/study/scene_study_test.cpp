@@ -1,4 +1,5 @@
 // `stipple study SCENE...` as a person runs it: what it writes, that it goes on, that its errors are the same bytes.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include "apps/study/sweep/scene_drawer.h"
 #include "engine/cpu/cpu_backend.h"
 #include "tests/support/drawn_shapes.h"
+#include "tests/support/patch_shapes.h"
 #include "tests/support/program.h"
 #include "tests/support/support.h"
 
@@ -182,6 +184,51 @@ TEST(SceneStudy, RefusesWhatItCannotDoBeforeItBegins) {
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --seeds"), 2, {"--seeds"});
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --rounds 3"), 2, {"--rounds"});
     EXPECT_FALSE(fs::exists(folder / "t"));
+}
+
+/// A torus of triangles, its radii times `scale`, as text.
+void writeTorus(const std::string& path, double scale) {
+    const lod::TriangleMesh mesh = test::torusMesh(120, 60);
+    std::string text = fmt::format(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nelement "
+        "face "
+        "{}\nproperty list uchar int vertex_indices\nend_header\n",
+        mesh.position.size(), mesh.indices.size() / 3);
+    for (const glm::dvec3& p : mesh.position) text += fmt::format("{} {} {}\n", scale * p.x, scale * p.y, scale * p.z);
+    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
+        text += fmt::format("3 {} {} {}\n", mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]);
+    test::spit(path, text);
+}
+
+TEST(SceneStudy, AuditsPatchesAgainstTheMeshThatTheyWereBuiltFrom) {
+    const test::TempFolder folder;
+    writeTorus(folder / "torus.ply", 1);
+    writeTorus(folder / "larger.ply", 1.05);
+    ASSERT_EQ(test::runProgram(folder, "build torus.ply --patches -o p.stipple --quiet").code, 0);
+    const std::string study =
+        "study p.stipple --errors 0.5,4 --sizes 160x120 --views 1 --blocks 1 --frames 1 --budgets none --quiet --json ";
+    const auto auditOf = [&](const std::string& more) {
+        const test::Outcome r = test::runProgram(folder, study + more);
+        EXPECT_EQ(r.code, 0) << r.err;
+        nlohmann::json j = nlohmann::json::parse(r.out, nullptr, false);
+        double beyond = 0;
+        for (const auto& c : j["configurations"]) {
+            EXPECT_GT(c["errors"]["audited_pixels"], 5'000);
+            beyond += c["errors"]["beyond_pixels"].get<double>();
+        }
+        std::printf("%s: %.0f beyond, against %s\n", more.c_str(), beyond,
+                    j["scenes"][0]["audited_against"].get<std::string>().c_str());
+        return std::pair(beyond, j["scenes"][0]["audited_against"].get<std::string>());
+    };
+    EXPECT_EQ(auditOf("--against torus.ply -o a"), std::pair(0.0, std::string("torus.ply")));
+    EXPECT_EQ(auditOf("-o b").second, "leaves");
+    EXPECT_GT(auditOf("--against larger.ply -o c").first, 1'000) << "the control: a mesh 5 % farther out";
+    test::expectOneLine(test::runProgram(folder, study + "--against larger.ply -o a"), 4, {"another study", "against"});
+    for (const char* odd :
+         {"study torus.ply --against torus.ply -o d", "study p.stipple p.stipple --against torus.ply -o d",
+          "study p.stipple --against p.stipple -o d"})
+        test::expectOneLine(test::runProgram(folder, std::string(odd) + " --quiet"), 2, {"--against"});
+    EXPECT_FALSE(fs::exists(folder / "d"));
 }
 
 /// A chunk that two instances need lies in its file once.

@@ -49,8 +49,8 @@ class FullDetail {
     std::unique_ptr<Fields> fields_;
 };
 
-/// Shapes of the leaves of placed stores; of patches the triangles of their cells. Error (budget): more than `most`
-/// shapes; (input): a chunk that cannot be read.
-Result<FullShapes> leavesOf(std::span<const render::PlacedStore> placed, size_t most);
+/// Shapes of the leaves of placed stores; of patches the triangles of their cells, unless `withPatches` is false. Error
+/// (budget): more than `most` shapes; (input): a chunk that cannot be read.
+Result<FullShapes> leavesOf(std::span<const render::PlacedStore> placed, size_t most, bool withPatches = true);
 
 }  // namespace stipple::study

@@ -18,6 +18,7 @@ struct Leaves {
     const lod::Store& store;
     const lod::Instance& place;
     FullShapes& shapes;
+    bool withPatches;
 
     dvec3 placed(const dvec3& local) const { return place.translation + place.rotation * (place.scale * local); }
 
@@ -65,6 +66,7 @@ struct Leaves {
     Result<void> add(uint32_t node, uint32_t index) {
         const lod::Payload& payload = store.hierarchy.payload(index);
         if (store.hierarchy.isGraph && payload.kind != lod::Kind::triangles) return {};  // coarse ones
+        if (!withPatches && payload.kind == lod::Kind::patches) return {};
         STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(store, index));
         if (payload.kind == lod::Kind::points) addPoints(node, chunk);
         if (payload.kind == lod::Kind::curves) addCurves(node, chunk);
@@ -76,12 +78,12 @@ struct Leaves {
 
 }  // namespace
 
-Result<FullShapes> leavesOf(std::span<const render::PlacedStore> placed, size_t most) {
+Result<FullShapes> leavesOf(std::span<const render::PlacedStore> placed, size_t most, bool withPatches) {
     FullShapes shapes;
     for (const render::PlacedStore& p : placed) {
         STIPPLE_TRY(lod::readWholeTable(*p.store));
         const lod::Hierarchy& h = p.store->hierarchy;
-        Leaves leaves{*p.store, p.place, shapes};
+        Leaves leaves{*p.store, p.place, shapes, withPatches};
         for (uint32_t n = 0; n < h.nodes.size(); ++n) {
             if (!h.isGraph && !h.nodes[n].isLeaf()) continue;
             Result<void> added;

@@ -48,6 +48,9 @@ std::string describePlan(const std::vector<StudyScene>& scenes, const StudySetti
     std::string text;
     for (const StudyScene& s : scenes) {
         text += fmt::format("scene {} {}\n", s.name, hexDigits(s.hash));
+        if (!s.against.empty())
+            text += fmt::format("against {}\n",
+                                hexDigits(hashBytes(s.against.data(), s.against.size() * sizeof(FullTriangle))));
         for (const PathView& v : s.views)
             text += fmt::format("view {} {} {} {} {} {} {} {} {} {} {} {} {}\n", v.path, v.number, v.camera.eye.x,
                                 v.camera.eye.y, v.camera.eye.z, v.camera.target.x, v.camera.target.y, v.camera.target.z,

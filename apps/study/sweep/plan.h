@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/study/audit/full_detail.h"
 #include "engine/render/environment.h"
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
@@ -23,7 +24,11 @@ struct PathView {
 struct StudyScene {
     std::string name;    ///< for a person: the file's, without its folders
     std::string source;  ///< the file of points that it was built from; empty: it is of something else
-    uint64_t hash = 0;   ///< of the content of all stores and where they stand
+    /// Of the mesh that a store of patches was built from, which pictures are audited against instead of its leaves;
+    /// and what it is called. Empty: leaves.
+    std::vector<FullTriangle> against;
+    std::string againstName;
+    uint64_t hash = 0;  ///< of the content of all stores and where they stand
     std::vector<render::PlacedStore> placed;
     std::vector<render::PlacedGroup> groups;
     std::vector<glm::dvec3> outline;  ///< points on the outside

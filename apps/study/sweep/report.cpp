@@ -116,7 +116,8 @@ json jsonOfStudy(const std::vector<StudyScene>& scenes, const StudyResult& resul
                       {"content", hexDigits(scene.hash)},
                       {"records", scene.records},
                       {"bytes", scene.storeBytes},
-                      {"views", scene.views.size()}});
+                      {"views", scene.views.size()},
+                      {"audited_against", scene.against.empty() ? "leaves" : scene.againstName}});
     for (const TruthCheck& t : result.truths)
         truths.push_back({{"scene", t.scene}, {"size", t.size}, {"doubled_db", numberJson(t.decibels)}});
     uint64_t beyond = 0, audited = 0;

@@ -49,10 +49,14 @@ uint32_t indexOf(const std::string& text) { return static_cast<uint32_t>(std::st
 
 /// The full detail of a scene, if it is not too much; why not is noted.
 std::optional<FullDetail> fullDetailOf(Run& run, uint32_t scene) {
-    auto shapes = leavesOf(run.scenes[scene].placed, run.result.settings.auditShapes);
-    if (shapes) return FullDetail(std::move(*shapes));
-    run.result.notes.push_back(fmt::format("{}: distances from the full detail were not measured: {} {}",
-                                           run.scenes[scene].name, shapes.error().where, shapes.error().what));
+    const StudyScene& s = run.scenes[scene];
+    auto shapes = leavesOf(s.placed, run.result.settings.auditShapes, s.against.empty());
+    if (shapes) {
+        shapes->triangles.insert(shapes->triangles.end(), s.against.begin(), s.against.end());
+        return FullDetail(std::move(*shapes));
+    }
+    run.result.notes.push_back(fmt::format("{}: distances from the full detail were not measured: {} {}", s.name,
+                                           shapes.error().where, shapes.error().what));
     return {};
 }
 
