@@ -87,6 +87,37 @@ TEST_F(Errors, OddSizesAreDrawnAsWell) {
     }
 }
 
+/// The last column and row of an odd size have parents of their own in a pyramid: what reaches the picture's border is
+/// drawn there, too.
+TEST_F(Errors, OddSizesAreDrawnToTheirBorders) {
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    for (const auto& [w, h] : {std::pair{127u, 129u}, {257u, 33u}, {131u, 67u}}) {
+        const lod::View fit = test::fitView(*store_, w, h);
+        const double depth =
+            glm::dot(0.5 * (store_->description.boundsMin + store_->description.boundsMax) - fit.eye, fit.forward);
+        const glm::dvec3 nearer = 0.55 * depth * fit.forward;
+        const render::Image drawn = draw(*backend, 2, render::Mode::pullpush, w, h, true, nearer),
+                            truth = draw(*oracle, 2, render::Mode::pullpush, w, h, true, nearer);
+        size_t covered = 0, differing = 0;
+        for (uint32_t y = 0; y < h; ++y)
+            for (uint32_t x = 0; x < w; ++x) {
+                if (x + 3 < w && y + 3 < h) continue;
+                const size_t i = size_t{y} * w + x;
+                covered += truth.rgba[i] >> 24 != 0;
+                for (uint32_t c = 0; c < 32; c += 8)
+                    if (std::abs(int(drawn.rgba[i] >> c & 255u) - int(truth.rgba[i] >> c & 255u)) > 8) {
+                        ++differing;
+                        break;
+                    }
+            }
+        printf("[ measured ] %u x %u: %zu of %zu covered pixels of the last columns and rows differ\n", w, h, differing,
+               covered);
+        EXPECT_GT(covered, 100u);
+        EXPECT_LE(differing, covered / 50);
+    }
+}
+
 TEST_F(Errors, EveryFrameOfTheSameViewIsTheSame) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     const render::Image first = draw(*backend, 0.5, render::Mode::pullpush);

@@ -146,6 +146,14 @@ TEST(Estimates, NormalsOfThinSheetsAreTheirsDownToWhatFloatsHold) {
         direct.computeDirect(c.cast<float>());
         naive = std::max(naive, std::abs(static_cast<double>(direct.eigenvalues()[0]) - least) / most);
     }
+    // Exact planes across the axes, as floors and walls are: rows of their covariances are nothing.
+    for (int a = 0; a < 3; ++a) {
+        Axes flat(rng);
+        flat.n = flat.s = flat.t = dvec3(0);
+        flat.n[a] = flat.s[(a + 1) % 3] = flat.t[(a + 2) % 3] = 1;
+        const lod::Spread found = spreadOf(slab(rng, flat, {1, 0.7, 0}, 48), dvec3(0));
+        EXPECT_NEAR(std::abs(double{found.normal[a]}), 1, 1e-6) << "axis " << a;
+    }
     std::printf("normals %.1e radians, least variances %.1e of the largest off; by angles in fp32 %.1e\n", worst,
                 thickness, naive);
     // Products are sums of 48 floats: 48 ulps of the largest at most, and what turns a normal is as much over the gap
