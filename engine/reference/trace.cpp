@@ -492,8 +492,7 @@ class Tracer {
 /// What of a backdrop a ray brings that meets nothing; `n`: rays along an edge of a pixel.
 dvec3 missedLight(const render::DrawSettings& draw, const lod::View& view, const ViewRay& ray, uint32_t n) {
     const dvec3 world = view.right * ray.direction.x + view.down * ray.direction.y + view.forward * ray.direction.z;
-    return lightFrom(*draw.backdrop, toMap(world, draw.worldUp),
-                     view.isOrthographic ? 0 : 1 / (view.focalPixels * n));
+    return lightFrom(*draw.backdrop, toMap(world, draw.worldUp), view.isOrthographic ? 0 : 1 / (view.focalPixels * n));
 }
 
 }  // namespace

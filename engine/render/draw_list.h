@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "engine/render/backdrop.h"
 #include "engine/render/content.h"
 #include "engine/render/effects/settings.h"
 #include "engine/render/effects/table.h"
-#include "engine/render/backdrop.h"
 #include "engine/render/environment.h"
 #include "lod/cut/cut.h"
 #include "lod/primitives/kinds.h"
