@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "engine/render/draw_list.h"
 #include "shaders/shared/lens.h"
@@ -9,10 +10,8 @@
 namespace stipple::render {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 /// Cosine of the elevation of a row's middle.
-double cosineOf(uint32_t row, uint32_t height) { return std::sin((row + 0.5) / height * kPi); }
+double cosineOf(uint32_t row, uint32_t height) { return std::sin((row + 0.5) / height * std::numbers::pi); }
 
 /// The mean of what [begin, end) covers of cells of width 1, each times `weightOf` it; `add(cell, weight)`.
 template <typename WeightOf, typename Add>
@@ -156,7 +155,8 @@ shared::BackgroundConstants backgroundConstants(const DrawSettings& settings, co
     c.axisZ = glm::vec3(axes[2]);
     c.scale = b.scale;
     // Rays that are parallel meet one place of it.
-    c.level = view.isOrthographic ? -100.0f : static_cast<float>(std::log2(b.height / (kPi * view.focalPixels)));
+    c.level =
+        view.isOrthographic ? -100.0f : static_cast<float>(std::log2(b.height / (std::numbers::pi * view.focalPixels)));
     c.width = b.width;
     c.height = b.height;
     c.levels = b.levels;
