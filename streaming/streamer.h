@@ -6,8 +6,8 @@
 //   4. it is uploaded within the budget arrived -> resident     (upload; drawable from the next frame on)
 //      or nobody wants it any more      arrived -> absent
 //   5. nobody keeps it any more         resident -> absent      (evict, least recently used, children before parents)
-// A chunk that cannot be read is failed: counted, its parent stays drawn, tried again after a pause. What the node table
-// does not know yet is asked for like a chunk: its page of the table is read then, and stays.
+// A chunk that cannot be read is failed: counted, its parent stays drawn, tried again after a pause. What the node
+// table does not know yet is asked for like a chunk: its page of the table is read then, and stays.
 #pragma once
 
 #include <cstdint>

@@ -64,7 +64,8 @@ TEST(StoreVersions, OldBytesOpenAndHoldWhatTheyHeld) {
         EXPECT_TRUE(report) << report.error().line();
     }
     // A new version comes with its own bytes.
-    EXPECT_EQ(versions, (std::set<uint32_t>{kOldVersion, kOldWideMeshVersion, kVersionBefore, kUnpagedVersion, kStoreVersion}));
+    EXPECT_EQ(versions,
+              (std::set<uint32_t>{kOldVersion, kOldWideMeshVersion, kVersionBefore, kUnpagedVersion, kStoreVersion}));
 }
 
 // Of build version 11: records know how far apart they lie, have weights, and name materials.

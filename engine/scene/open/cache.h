@@ -11,7 +11,7 @@
 namespace stipple::scene {
 
 Result<std::shared_ptr<const lod::Store>> openStoreFile(const std::string& path,
-                                                       lod::Tables tables = lod::Tables::whole);
+                                                        lod::Tables tables = lod::Tables::whole);
 
 /// Builds a store into a path.
 using StoreMaker = std::function<Result<lod::BuildReport>(const std::string& path, Progress& progress)>;
