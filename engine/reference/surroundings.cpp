@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace stipple::reference {
 namespace {
 
 using glm::dvec3;
-
-constexpr double kPi = 3.14159265358979323846;
 
 dvec3 texelAt(const render::Backdrop& b, size_t level, int64_t x, int64_t y) {
     const auto sizeOf = [&](uint32_t size) { return std::max<int64_t>(size / (int64_t{1} << level), 1); };
@@ -34,9 +33,10 @@ dvec3 look(const render::Backdrop& b, size_t level, double u, double v) {
 
 dvec3 lightFrom(const render::Backdrop& b, const dvec3& direction, double angle) {
     const dvec3 d = glm::normalize(direction);
-    const double u = 0.5 + std::atan2(d.x, -d.z) / (2 * kPi), v = std::acos(std::clamp(d.y, -1.0, 1.0)) / kPi;
-    const double level =
-        std::clamp(angle > 0 ? std::log2(angle * b.height / kPi) : 0.0, 0.0, static_cast<double>(b.levels) - 1);
+    const double u = 0.5 + std::atan2(d.x, -d.z) / (2 * std::numbers::pi),
+                 v = std::acos(std::clamp(d.y, -1.0, 1.0)) / std::numbers::pi;
+    const double level = std::clamp(angle > 0 ? std::log2(angle * b.height / std::numbers::pi) : 0.0, 0.0,
+                                    static_cast<double>(b.levels) - 1);
     const auto fine = static_cast<size_t>(level);
     const size_t coarse = std::min<size_t>(fine + 1, b.levels - 1);
     return double{b.scale} * glm::mix(look(b, fine, u, v), look(b, coarse, u, v), level - static_cast<double>(fine));
