@@ -23,19 +23,14 @@ Result<Device> Device::open(const std::string& name, unsigned threads) {
 
 std::string Device::name() const { return held_->backend->device(); }
 
-namespace {
-
-/// Of the settings of the last frame, so that its picture is read once.
-struct Surroundings {
-    std::string path;
-    double scale = 0;
-    std::shared_ptr<const render::Environment> light;
-    std::shared_ptr<const render::Backdrop> backdrop;
-};
-
-}  // namespace
-
 struct Renderer::Held {
+    /// Of the settings of the last frame, so that its picture is read once.
+    struct Surroundings {
+        std::string path;
+        double scale = 0;
+        std::shared_ptr<const render::Environment> light;
+        std::shared_ptr<const render::Backdrop> backdrop;
+    };
     std::shared_ptr<Device::Held> device;  // ends last
     Surroundings around;
     scene::OpenedScene scene;
@@ -84,7 +79,7 @@ Error busy() {
     if (!(s.environmentScale >= 0 && s.environmentScale <= 1e6)) return refuse("is 0 to 1e6", "environmentScale");
     Executor& executor = *r.device->executor;
     if (r.around.path != s.environment || r.around.scale != s.environmentScale) {
-        Surroundings of{s.environment, s.environmentScale, {}, {}};
+        Renderer::Held::Surroundings of{s.environment, s.environmentScale, {}, {}};
         STIPPLE_ASSIGN(of.light, scene::openEnvironment(of.path, of.scale, kMemory, executor,
                                                         scene::hasMirrors(r.scene.placed, {})));
         r.around = std::move(of);
