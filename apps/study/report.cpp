@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "apps/study/mode_name.h"
 #include "apps/study/papers.h"
 #include "apps/study/study.h"
 #include "engine/reference/variants/variants.h"
@@ -14,8 +15,6 @@ using render::Mode;
 
 std::string decibels(double v) { return std::isinf(v) ? "same" : fmt::format("{:.1f}", v); }
 nlohmann::json numberOf(double v) { return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json("inf"); }
-const char* nameOf(Mode mode) { return render::reconstructionOf(mode).name; }
-
 std::string modeHeads() {
     std::string out;
     for (const render::Reconstruction& r : render::reconstructions()) out += fmt::format(" {} |", r.name);

@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/study/mode_name.h"
 #include "apps/study/plots/svg.h"
 #include "apps/study/sweep/report.h"
 
 namespace stipple::study {
 namespace {
-
-const char* nameOf(render::Mode mode) { return render::reconstructionOf(mode).name; }
 
 std::string tipOf(const Summary& s) {
     return fmt::format("{}, {} px asked for: {} ms ({} to {}), {} dB, {} px at p99", nameOf(s.of.mode),

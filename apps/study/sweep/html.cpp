@@ -1,6 +1,7 @@
 // report.html: text, tables, charts and crops in one file.
 #include <fmt/format.h>
 
+#include "apps/study/mode_name.h"
 #include "apps/study/plots/svg.h"
 #include "apps/study/plots/vega.h"
 #include "apps/study/statistics/compare.h"
@@ -8,8 +9,6 @@
 
 namespace stipple::study {
 namespace {
-
-const char* nameOf(render::Mode mode) { return render::reconstructionOf(mode).name; }
 
 constexpr const char* kStyle =
     "body{font:15px/1.5 sans-serif;max-width:62em;margin:2em auto;padding:0 1em;color:#222;background:#fff}"

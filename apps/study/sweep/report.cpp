@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "apps/study/mode_name.h"
 #include "apps/study/plots/svg.h"
 #include "apps/study/plots/vega.h"
 #include "engine/base/hash.h"
@@ -17,7 +18,6 @@ namespace {
 
 using nlohmann::json;
 
-const char* nameOf(render::Mode mode) { return render::reconstructionOf(mode).name; }
 json numberJson(double v) {
     if (std::isfinite(v)) return v;
     return std::isnan(v) ? json() : json(v > 0 ? "inf" : "-inf");

@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/study/mode_name.h"
 #include "apps/study/plots/svg.h"
 #include "apps/study/statistics/compare.h"
 
 namespace stipple::study {
 namespace {
-
-const char* nameOf(render::Mode mode) { return render::reconstructionOf(mode).name; }
 
 /// Sentences on one configuration and the best of the panel at the same error asked for.
 void addLosses(const Panel& panel, const Summary& s, std::vector<std::string>& out) {
