@@ -207,11 +207,18 @@ class RowProgram {
         if (!isKept_ && showsEmpty_) return showEmpty(at);
         if (!isKept_) empty_.fill(outputAt(frame_, at.first), at.n);
     }
-    void showEmpty(const RowPlace& at) const {
+    /// Rows of several empty tiles come as one; passes take those of a tile at most.
+    void showEmpty(const RowPlace& whole) const {
         thread_local SurfaceRow nothing{};
-        for (const Step& step : steps_)
-            if (step.pass->showsEmpty) step.pass->run(at, nothing);
-        cpuPassOf(render::Pass::output).row.run(at, nothing);
+        for (uint32_t done = 0; done < whole.n; done += kTile) {
+            RowPlace at = whole;
+            at.x0 += done;
+            at.first += done;
+            at.n = std::min(whole.n - done, kTile);
+            for (const Step& step : steps_)
+                if (step.pass->showsEmpty) step.pass->run(at, nothing);
+            cpuPassOf(render::Pass::output).row.run(at, nothing);
+        }
     }
 
     Frame& frame_;
