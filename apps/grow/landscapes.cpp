@@ -372,8 +372,8 @@ scene::Scene growDemo(const LandscapeOptions& o, const std::string& store) {
     // Effects where they belong: shadows of that sun, air between the rows and the far trees, creases of bark and
     // grass, light that rolls off. Glass and mirrors call for theirs themselves.
     s.effects.names = {"shadow", "fog", "occlusion", "tone"};
-    s.effects.values = {"fog.density=0.004",    "fog.kind=air",      "fog.colour=176,190,206",
-                        "occlusion.radius=0.6", "tone.exposure=1.3", "tone.curve=filmic"};
+    s.effects.values = {"fog.density=0.0012",   "fog.kind=air",      "fog.colour=176,190,206",
+                        "occlusion.radius=0.6", "tone.exposure=1.6", "tone.curve=filmic"};
     return s;
 }
 
