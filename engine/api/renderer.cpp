@@ -75,6 +75,7 @@ Error busy() {
             shared::linearFromSrgb(static_cast<float>(s.background.at(static_cast<size_t>(c))) / 255.0f);
     if (s.environment.empty() && s.environmentIsBackground)
         return refuse("is the picture of environment, which is empty", "environmentIsBackground");
+    if (!s.environmentIsBackground) r.around.backdrop.reset();
     if (s.environment.empty()) return {};
     if (!(s.environmentScale >= 0 && s.environmentScale <= 1e6)) return refuse("is 0 to 1e6", "environmentScale");
     Executor& executor = *r.device->executor;

@@ -11,9 +11,16 @@ namespace {
 
 bool isTone(const EffectRequest& request) { return request.name == "tone"; }
 
-/// Of a pixel that is covered by `share`: what the surface sends.
+/// Of a pixel that is covered by `share`: what the surface sends. (Shares are kept in 8 bits: before what is much
+/// brighter the rest may come out below nothing.)
 float ownLight(const Image& image, size_t pixel, size_t channel, const glm::vec3& behind, float share) {
-    return (image.linear[3 * pixel + channel] - (1 - share) * behind[static_cast<int>(channel)]) / share;
+    const float all = image.linear[3 * pixel + channel];
+    return std::max(all - (1 - share) * behind[static_cast<int>(channel)], 0.0f) / share;
+}
+
+/// Is it more than the rounding of its share makes of what is behind?
+bool isTold(double luminance, const glm::vec3& behind, float share) {
+    return luminance * share >= 0.5 / 255 * (0.2126 * behind.x + 0.7152 * behind.y + 0.0722 * behind.z);
 }
 
 float coverOf(const Image& image, size_t pixel) { return static_cast<float>(image.rgba[pixel] >> 24) / 255.0f; }
@@ -40,6 +47,7 @@ double meteredExposure(const Image& image, const Behind& behind) {
         const glm::vec3 beyond = share < 1 ? behind.at(i) : glm::vec3(0);
         const auto light = [&](size_t c) { return double{ownLight(image, i, c, beyond, share)}; };
         const double luminance = 0.2126 * light(0) + 0.7152 * light(1) + 0.0722 * light(2);
+        if (share < 1 && !isTold(luminance, beyond, share)) continue;
         logarithms += double{share} * std::log2(std::clamp(luminance, kLeast, 1 / kLeast));
         weights += double{share};
     }
