@@ -340,6 +340,7 @@ bool Streamer::startPage(ChunkKey unknown) {
     if (!source.pages || frame_ < life.retryAt) return false;
     life.isRequested = true;
     ++pagesInFlight_;
+    ++counters_.inFlight;
     auto request = std::make_unique<PageRequest>();
     *request = {unknown.source, page, source.hierarchy, source.pages.get(), {}};
     executor_.read([this, of = request.release()] {
@@ -354,6 +355,7 @@ void Streamer::collectPages() {
     if (pagesInFlight_ == 0) return;
     for (const auto& done : completedPages_.takeAll()) {
         --pagesInFlight_;
+        --counters_.inFlight;
         PageLife& life = sources_[done->source].pageLives[done->page];
         life.isRequested = false;
         if (done->read) {

@@ -11,7 +11,6 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
-#include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
 
@@ -178,9 +177,8 @@ struct DemoFolder {
     explicit DemoFolder(const std::string& folder)
         : scan((fs::path(folder) / "scan.las").string()),
           store((fs::path(folder) / "scan.stipple").string()),
-          scene((fs::path(folder) / "demo.glb").string()),
-          walk((fs::path(folder) / "walk.json").string()) {}
-    std::string scan, store, scene, walk;
+          scene((fs::path(folder) / "demo.glb").string()) {}
+    std::string scan, store, scene;
 };
 
 /// Makes the folder of a demo, which is an output itself.
@@ -191,10 +189,10 @@ Result<std::vector<Output>> outputsOf(const LandscapeRun& o) {
     if (error)
         return fail(ErrorKind::output, "cannot be created: " + error.message(), o.output, "name a folder to write");
     const DemoFolder demo(o.output);
-    return std::vector<Output>{{demo.scan}, {demo.store, OutputKind::store}, {demo.scene}, {demo.walk}};
+    return std::vector<Output>{{demo.scan}, {demo.store, OutputKind::store}, {demo.scene}};
 }
 
-/// The folder of a demo: a scan, built, a path through the scene, and the scene that places it.
+/// The folder of a demo: a scan, built, and the scene that places it.
 Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
     const DemoFolder demo(o.output);
     grow::ScanOptions options;
@@ -207,8 +205,6 @@ Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
     lod::BuildSettings settings;
     settings.isStopped = isStopRequested;
     STIPPLE_TRY(lod::buildStore({demo.scan}, demo.store, settings, *executor, progress));
-    const std::string walk = grow::demoWalk();
-    STIPPLE_TRY(writeWholeFile(demo.walk, walk.data(), walk.size()));
     scene = grow::growDemo(o.landscape, "scan.stipple");
     STIPPLE_TRY(addTextures({}, scene));
     return demo.scene;

@@ -185,10 +185,11 @@ bool isPossibleNode(const Hierarchy& h, uint32_t number, uint64_t chunksEnd) {
     return fits && !(h.isMixed && n.normalConeCosine > 0);
 }
 
-/// Is it the child of its parent, in its octant of the parent's cell?
-bool isPossibleChild(const Hierarchy& h, uint32_t number) {
+/// Is it the child of its parent, in its octant of the parent's cell? `begin`: of the nodes that are checked; those
+/// before are there only if their page was found to be right.
+bool isPossibleChild(const Hierarchy& h, uint32_t number, uint64_t begin) {
     const Node& n = h.nodes[number];
-    if (n.parent >= number) return false;
+    if (n.parent >= number || (n.parent < begin && !h.known.hasNode(n.parent))) return false;
     const Node& parent = h.nodes[n.parent];
     uint32_t child = parent.firstChild;
     for (uint32_t octant = 0; octant < 8; ++octant) {
@@ -215,7 +216,7 @@ Result<void> checkTree(const Hierarchy& h, const std::string& path, uint64_t beg
         const auto number = static_cast<uint32_t>(i);
         const Node& n = h.nodes[i];
         bool fits = isPossibleNode(h, number, chunksEnd) && (n.isLeaf() || n.firstChild == before.children) &&
-                    (i == 0 || isPossibleChild(h, number));
+                    (i == 0 || isPossibleChild(h, number, begin));
         h.forEachPayload(number, [&](uint32_t chunk) {
             const Payload& p = h.payload(chunk);
             if (p.kind != Kind::triangles) return;

@@ -151,7 +151,10 @@ Result<void> NodePages::checkDirectory(const Head& head) const {
         if (std::max({has.nodes, has.further, has.groups, has.runs, has.parents, has.groupTextures}) >
                 section.rawBytes ||
             fewestPageBytes(has) + has.streams * sizeof(StreamOnDisk) > section.rawBytes ||
-            has.steps > section.rawBytes / sizeof(CodeCount) * 255 || payloads > file_->sizeBytes() / kFewestChunkBytes)
+            has.steps > 510 * (has.nodes + has.further) || has.streams > kMostStreams * (has.nodes + has.further) ||
+            has.groups > has.nodes + has.further ||
+            (!isGraph_ && (has.runs > 8 * has.groups || has.parents + has.groupTextures > 0)) ||
+            payloads > file_->sizeBytes() / kFewestChunkBytes)
             return bad();
         end = section.offset + section.bytes;
     }

@@ -36,7 +36,7 @@ bool decodeBase64(std::string_view text, std::vector<uint8_t>& out) {
     return true;
 }
 
-/// The bytes behind a URI: data, or a file beside the glTF file (or what stands for one).
+/// The bytes behind a URI: data, or a file beside the glTF file.
 Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, const std::string& where,
                                    const ReadSettings& settings) {
     std::vector<uint8_t> bytes;
@@ -51,11 +51,10 @@ Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, c
         }
         return bytes;
     }
-    const bool isAddress = uri.find("://") != std::string::npos;
-    if (isAddress && !c.resolve)
+    if (uri.find("://") != std::string::npos)
         return fail(ErrorKind::input, fmt::format("lies at {}, and only local files are read", uri), where,
                     "download it first");
-    return readNamed(c.resolve, c.folder, isAddress ? uri : nameOfUri(uri), settings);
+    return readFileOfScene(c.folder, nameOfUri(uri), settings);
 }
 
 double component(const uint8_t* at, int type, bool normalised) {

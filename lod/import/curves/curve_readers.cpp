@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "engine/base/file.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::lod {
 namespace {
@@ -20,10 +21,8 @@ std::string extensionOf(const std::string& path, FileKind kind) {
 
 }  // namespace
 
-bool isCurveFile(const std::string& path) { return isCurveFile(path, fileKindOf(path)); }
-
-bool isCurveFile(const std::string& path, FileKind kind) {
-    const std::string e = extensionOf(path, kind);
+bool isCurveFile(const std::string& path) {
+    const std::string e = extensionOf(path, fileKindOf(path));
     return e == ".swc" || e == ".trk" || e == ".hair" || e == ".txt" || e == ".csv";
 }
 
