@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <thread>
 
 #include "apps/stipple/report.h"
 #include "engine/base/process.h"
@@ -115,7 +114,7 @@ Result<void> awaitRoot(const FramesPlan& plan, const render::FrameSettings& sett
         const uint64_t before = streamer.counters().requests;
         streamer.request(state.cut);
         if (streamer.isIdle() && streamer.counters().requests == before) break;
-        std::this_thread::yield();
+        streamer.wait();  // helps where no other thread can be had
     }
     // Nothing is wanted where nothing is in view; otherwise there is nothing to show at all.
     const MissingChunks missing = missingOf(state);
