@@ -308,6 +308,21 @@ void addBalls(scene::Scene& s, const Ground& ground) {
     }
 }
 
+/// From the south-west, 35 degrees high; over the sky's light.
+void addSun(scene::Scene& s) {
+    scene::Light sun;
+    sun.kind = scene::LightKind::directional;
+    sun.colour = {1, 0.95f, 0.85f};
+    sun.intensity = 3;
+    s.lights.push_back(sun);
+    scene::Node node;
+    node.name = "sun";
+    node.light = 0;
+    const double kTurn = -0.9, kHigh = 0.61;
+    node.local = glm::rotate(glm::rotate(glm::dmat4(1), kTurn, dvec3(0, 1, 0)), -kHigh, dvec3(1, 0, 0));
+    s.nodes.push_back(node);
+}
+
 }  // namespace
 
 scene::Scene growDemo(const LandscapeOptions& o, const std::string& store) {
@@ -353,7 +368,29 @@ scene::Scene growDemo(const LandscapeOptions& o, const std::string& store) {
     scan.local = glm::rotate(glm::translate(glm::dmat4(1), dvec3(0, ground.at(0, 0) + 0.05, 0)), -1.5707963267948966,
                              dvec3(1, 0, 0));
     s.nodes.push_back(scan);
+    addSun(s);
+    // Effects where they belong: shadows of that sun, air between the rows and the far trees, creases of bark and
+    // grass, light that rolls off. Glass and mirrors call for theirs themselves.
+    s.effects.names = {"shadow", "fog", "occlusion", "tone"};
+    s.effects.values = {"fog.density=0.0012",   "fog.kind=air",      "fog.colour=176,190,206",
+                        "occlusion.radius=0.6", "tone.exposure=1.6", "tone.curve=filmic"};
     return s;
+}
+
+std::string demoWalk() {
+    return R"({
+  "fps": 1,
+  "keys": [
+    {"t": 0, "eye": [30, 13, 62], "target": [0, 3, 6], "up": [0, 1, 0], "fov": 55},
+    {"t": 1, "eye": [0, 4, 40], "target": [0, 2, 24], "up": [0, 1, 0], "fov": 55},
+    {"t": 2, "eye": [8, 3, 31], "target": [1, 3.2, 27], "up": [0, 1, 0], "fov": 45},
+    {"t": 3, "eye": [-24, 5, 14], "target": [-40, 4, -10], "up": [0, 1, 0], "fov": 60},
+    {"t": 4, "eye": [-46, 3, -30], "target": [-46, 60, -38], "up": [0, 0, 1], "fov": 50},
+    {"t": 5, "eye": [-10, 30, -60], "target": [-10, 90, -75], "up": [0, 0, 1], "fov": 50},
+    {"t": 6, "eye": [14, 7, -38], "target": [0, 3, 6], "up": [0, 1, 0], "fov": 55}
+  ]
+}
+)";
 }
 
 }  // namespace stipple::grow

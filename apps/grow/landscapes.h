@@ -28,5 +28,7 @@ scene::Scene growMeadow(const LandscapeOptions& options);
 /// Gentle ground with a meadow, a small orchard, a boulder, balls of glass and mirrors; the file `store` (a scan)
 /// stands beside them.
 scene::Scene growDemo(const LandscapeOptions& options, const std::string& store);
+/// A camera path through it (for --camera-path): from afar, past glass and mirrors, between the rows, to the sky.
+std::string demoWalk();
 
 }  // namespace stipple::grow

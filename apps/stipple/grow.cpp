@@ -11,6 +11,7 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
+#include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
 
@@ -177,8 +178,9 @@ struct DemoFolder {
     explicit DemoFolder(const std::string& folder)
         : scan((fs::path(folder) / "scan.las").string()),
           store((fs::path(folder) / "scan.stipple").string()),
-          scene((fs::path(folder) / "demo.glb").string()) {}
-    std::string scan, store, scene;
+          scene((fs::path(folder) / "demo.glb").string()),
+          walk((fs::path(folder) / "walk.json").string()) {}
+    std::string scan, store, scene, walk;
 };
 
 /// Makes the folder of a demo, which is an output itself.
@@ -189,10 +191,10 @@ Result<std::vector<Output>> outputsOf(const LandscapeRun& o) {
     if (error)
         return fail(ErrorKind::output, "cannot be created: " + error.message(), o.output, "name a folder to write");
     const DemoFolder demo(o.output);
-    return std::vector<Output>{{demo.scan}, {demo.store, OutputKind::store}, {demo.scene}};
+    return std::vector<Output>{{demo.scan}, {demo.store, OutputKind::store}, {demo.scene}, {demo.walk}};
 }
 
-/// The folder of a demo: a scan, built, and the scene that places it.
+/// The folder of a demo: a scan, built, a path through the scene, and the scene that places it.
 Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
     const DemoFolder demo(o.output);
     grow::ScanOptions options;
@@ -205,6 +207,8 @@ Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
     lod::BuildSettings settings;
     settings.isStopped = isStopRequested;
     STIPPLE_TRY(lod::buildStore({demo.scan}, demo.store, settings, *executor, progress));
+    const std::string walk = grow::demoWalk();
+    STIPPLE_TRY(writeWholeFile(demo.walk, walk.data(), walk.size()));
     scene = grow::growDemo(o.landscape, "scan.stipple");
     STIPPLE_TRY(addTextures({}, scene));
     return demo.scene;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "apps/stipple/background_options.h"
 #include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
@@ -38,8 +39,7 @@ namespace {
 
 struct Options {
     std::vector<std::string> inputs;
-    std::string output, size = "1280x720", device = "auto", shade = "auto",
-                        background = fmt::format("{}", fmt::join(render::kBackground, ","));
+    std::string output, size = "1280x720", device = "auto", shade = "auto";
     std::string debug = "none", resident = "1G", transfer = "srgb";
     double error = 1, curveExact = 2, wind = 0, seconds = 0;
     ModeOptions drawn;
@@ -52,6 +52,7 @@ struct Options {
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
+    BackgroundOptions background;
     SunOptions sun;
     MaterialOptions material;
     EffectOptions effects;
@@ -60,14 +61,6 @@ struct Options {
 bool closesGaps(const std::string& mode) {
     const render::Reconstruction* of = render::reconstructionNamed(mode);
     return !of || of->closesGaps;
-}
-
-Result<glm::dvec3> backgroundOf(const Options& o) {
-    STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
-    for (int c = 0; c < 3; ++c)
-        if (!(background[c] >= 0 && background[c] <= 255))
-            return fail(ErrorKind::usage, "channels are 0 to 255", "--background");
-    return background;
 }
 
 image::PictureFormat formatOf(const Options& o) {
@@ -85,7 +78,7 @@ Result<void> checkArguments(const Options& o) {
         return fail(ErrorKind::usage, "traces the full detail, whatever it takes", "--mode reference",
                     "leave out --target-ms and --target-error");
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
-    STIPPLE_TRY(backgroundOf(o));
+    STIPPLE_TRY(o.background.check(o.environment));
     if (o.transfer == "rec709" && std::filesystem::path(o.output).extension() != ".png")
         return fail(ErrorKind::usage, "only a .png has colours that are encoded; an .exr has light itself",
                     "--transfer rec709", "leave it out, or write a .png");
@@ -114,10 +107,6 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     o.sun.applyTo(s.draw);
     s.draw.exactCurves = static_cast<float>(o.curveExact);
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
-    STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
-    for (int c = 0; c < 3; ++c)
-        s.draw.background[c] = shared::linearFromSrgb(static_cast<float>(background[c]) / 255.0f);
-    if (o.alpha) s.draw.background = glm::vec3(0);  // what is not covered adds nothing
     static const std::array<const char*, 5> names{"none", "level", "error", "holes", "normals"};
     s.draw.debugView = static_cast<uint32_t>(std::find(names.begin(), names.end(), o.debug) - names.begin());
     s.wantDepthAndNormal = std::filesystem::path(o.output).extension() == ".exr";
@@ -272,7 +261,8 @@ std::string drawnText(const render::FrameState& state, const ModeOptions& drawn)
 
 /// The result, as text or JSON.
 void tell(const Options& o, const render::FrameState& state, const render::DrawSettings& settings,
-          const Verdict& verdict, const Timings& timings, const glm::uvec2& size, size_t views) {
+          const Verdict& verdict, const Timings& timings, const glm::uvec2& size, const Written& written) {
+    const size_t views = written.of;
     const FrameCounters& c = state.counters;
     if (o.json) {
         nlohmann::json passes = nlohmann::json::array();
@@ -291,6 +281,7 @@ void tell(const Options& o, const render::FrameState& state, const render::DrawS
             {"frame_ms", {{"median", quantile(timings.frames, 0.5)}, {"p95", quantile(timings.frames, 0.95)}}},
             {"passes", passes},
             {"effects", effectsJson(render::effectStatus(state, settings))},
+            {"effect_changes", changesJson(written.walk.changes())},
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
             {"patch_blocks_drawn", patchBlocksOf(state)},
@@ -319,6 +310,7 @@ void tell(const Options& o, const render::FrameState& state, const render::DrawS
         fmt::print("{} pictures; the worst is {}: {}{}, {:.1f} ms a frame on {}\n", views,
                    numbered(o.output, verdict.worst), errorText(verdict, o.drawn.mode), pruningText(verdict.pruned),
                    quantile(timings.frames, 0.5), state.backend->device());
+        fmt::print("{}", changesText(written.walk.changes()));
     } else if (!o.quiet) {
         fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawnText(state, o.drawn),
                    errorText(verdict, o.drawn.mode), pruningText(verdict.pruned), quantile(timings.frames, 0.5),
@@ -360,6 +352,8 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_ASSIGN(settings.draw.environment,
                    scene::openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes,
                                           *executor, scene::hasMirrors(scene.placed, o.material.material())));
+    STIPPLE_TRY(o.background.applyTo(settings.draw, o.environment, o.build.reading().memoryBytes, *executor));
+    if (o.alpha) settings.draw.background = glm::vec3(0);  // what is not covered adds nothing
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
     STIPPLE_TRY(o.effects.applyTo(settings.draw, scene.effects, scene::storesOf(scene.placed), o.quiet));
     if (o.drawn.mode == "reference") return runTraced(o, scene, shot, settings, legend, *executor, written);
@@ -386,7 +380,7 @@ Result<void> run(const Options& o, Written& written) {
         drawLegend(legend, state->image);
         STIPPLE_TRY(image::writePicture(o.output, state->image, formatOf(o)));
     }
-    tell(o, *state, settings.draw, verdict, timings, size, shot.views.size());
+    tell(o, *state, settings.draw, verdict, timings, size, written);
     if (!o.quiet) sayShadows(*state);
     if (!o.quiet) sayEmpty(verdict.empty, shot.views.size(), o.output);
     if (!o.quiet && verdict.leavesAround > 0)
@@ -440,12 +434,8 @@ void addReading(CLI::App& sub, Options& o) {
 
 /// What is behind the scene, and how colours are written.
 void addPictureTo(CLI::App& sub, Options& o) {
-    auto* const background =
-        sub.add_option("--background", o.background, "colour behind the scene, sRGB, 0 to 255 each")
-            ->type_name("R,G,B")
-            ->capture_default_str();
     sub.add_flag("--alpha", o.alpha, "no background: how much of a pixel is covered goes into the alpha channel")
-        ->excludes(background);
+        ->excludes(o.background.addTo(sub));
     sub.add_option("--transfer", o.transfer, "how colours of a .png are encoded, which it says itself")
         ->check(oneOf({"srgb", "rec709"}))
         ->capture_default_str();

@@ -173,6 +173,7 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
         }
         if (!isSingle) STIPPLE_TRY(checkStopped(plan.output));
         verdict.judge(state, &views[i]);
+        written.walk.look(i, render::effectStatus(state, frame.draw));
         STIPPLE_TRY(accumulate(plan, i, frame, state, verdict));
         if (isSingle) break;
         if (plan.legend) drawLegend(*plan.legend, state.image);

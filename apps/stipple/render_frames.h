@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/stipple/camera_options.h"
+#include "apps/stipple/effect_walk.h"
 #include "apps/stipple/legend.h"
 #include "engine/image/coverage.h"
 #include "engine/render/accumulation.h"
@@ -62,6 +63,7 @@ struct Verdict {
 /// What of the pictures is there.
 struct Written {
     size_t pictures = 0, of = 1;
+    EffectWalk walk;  ///< what effects they show
 };
 
 /// out.png -> out_0007.png

@@ -116,7 +116,6 @@ bool holdsPatches(const lod::Hierarchy& h) {
 
 /// The mesh that a store of patches was built from.
 Result<void> readAgainst(const std::string& input, const StudyOptions& o, study::StudyScene& s) {
-    if (s.placed.size() == 1) STIPPLE_TRY(lod::readWholeTable(*s.placed.front().store));
     const bool isPatches = s.placed.size() == 1 && holdsPatches(s.placed.front().store->hierarchy);
     if (!lod::isStoreFile(input) || !isPatches || !hasTriangles(o.against))
         return fail(ErrorKind::usage, "is the mesh that a built scene of patches was built from",

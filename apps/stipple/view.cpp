@@ -452,6 +452,7 @@ Result<void> run(const ViewOptions& o) {
     STIPPLE_TRY(o.material.check(o.shade));
     STIPPLE_TRY(o.effects.check());
     STIPPLE_TRY(o.sun.check(o.shade));
+    STIPPLE_TRY(o.background.check(o.environment));
     STIPPLE_TRY(checkScreenshot(o));
     STIPPLE_TRY(scene::checkInputs(o.inputs));
     if (!gpu::hasDisplay())
@@ -474,6 +475,7 @@ Result<void> run(const ViewOptions& o) {
     STIPPLE_ASSIGN(frame.draw.environment,
                    scene::openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes,
                                           *executor, scene::hasMirrors(scene.placed, o.material.material())));
+    STIPPLE_TRY(o.background.applyTo(frame.draw, o.environment, o.build.reading().memoryBytes, *executor));
     ViewSession session(o, *stage.backend, *executor);
     STIPPLE_TRY(session.show(std::move(scene), o.colour, frame));
     const double aspect = static_cast<double>(size.x) / size.y;
@@ -542,6 +544,7 @@ void setupView(CLI::App& app, int& status) {
     o->camera.addTo(*sub);
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
+    o->background.addTo(*sub);
     o->sun.addTo(*sub);
     o->material.addTo(*sub, "all points, instead of their own");
     o->build.addTo(*sub);

@@ -1,6 +1,7 @@
 // The scene that the window shows: its chunks, its colours, its axis. What fails leaves it as it was.
 #pragma once
 
+#include "apps/stipple/background_options.h"
 #include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
@@ -25,6 +26,7 @@ struct ViewOptions {
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
+    BackgroundOptions background;
     SunOptions sun;
     MaterialOptions material;
     EffectOptions effects;

@@ -3,12 +3,14 @@
 #include <stipple/build.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <numeric>
 
 #include "engine/api/convert.h"
 #include "engine/base/executor.h"
-#include "engine/scene/open/open_scene.h"
+#include "engine/base/hash.h"
+#include "engine/scene/open/build_bytes.h"
 
 namespace stipple::v1 {
 namespace {
@@ -56,6 +58,36 @@ Result<BuildReport> run(const std::string& store, const BuildSettings& settings,
     ::stipple::Result<lod::BuildReport> built = work(*executor, progress);
     if (!built) return v1::given(built.error());
     return given(std::move(*built));
+}
+
+/// Bytes that are the caller's.
+class CallersBytes final : public ByteSource {
+  public:
+    explicit CallersBytes(const Bytes& bytes) : bytes_(bytes) {}
+    uint64_t sizeBytes() const override { return bytes_.count; }
+    const std::string& path() const override { return bytes_.name; }
+    uint64_t identity() const override { return hashBytes(bytes_.data, bytes_.count); }
+    ::stipple::Result<void> readAt(uint64_t offset, void* to, size_t count) const override {
+        if (offset > bytes_.count || count > bytes_.count - offset)
+            return fail(::stipple::ErrorKind::input,
+                        "ends after " + std::to_string(bytes_.count) + " bytes, read at " + std::to_string(offset),
+                        bytes_.name, "is it whole?");
+        if (count > 0) std::memcpy(to, static_cast<const char*>(bytes_.data) + offset, count);
+        return {};
+    }
+
+  private:
+    Bytes bytes_;
+};
+
+/// Never empty: no file is read for what lies in memory.
+scene::Resolve resolverOf(const Resolve& resolve) {
+    return [&resolve](const std::string& name) -> ::stipple::Result<std::shared_ptr<const ByteSource>> {
+        if (!resolve) return std::shared_ptr<const ByteSource>();
+        Result<std::vector<uint8_t>> found = resolve(name);
+        if (!found) return tl::unexpected(taken(found.error()));
+        return std::make_shared<const MemorySource>(name, std::move(*found));
+    };
 }
 
 uint32_t packed(const std::array<uint8_t, 3>& c) {
@@ -116,6 +148,21 @@ Result<BuildReport> build(const std::vector<std::string>& inputs, const std::str
     });
 }
 
+Result<BuildReport> buildBytes(const std::vector<Bytes>& inputs, const std::string& store,
+                               const BuildSettings& settings, const Resolve& resolve) {
+    if (inputs.empty()) return Error{ErrorKind::usage, "there is nothing to build from", "inputs", ""};
+    std::vector<std::shared_ptr<const ByteSource>> sources;
+    for (const Bytes& input : inputs) {
+        if (input.data == nullptr && input.count > 0)
+            return Error{ErrorKind::usage, "says that it has bytes, but not where", input.name, "set data"};
+        if (input.count == 0) return Error{ErrorKind::input, "is empty", input.name, "is the download complete?"};
+        sources.push_back(std::make_shared<const CallersBytes>(input));
+    }
+    return run(store, settings, [&](Executor& executor, ::stipple::Progress& progress) {
+        return scene::buildBytes(sources, resolverOf(resolve), store, settingsOf(settings), executor, progress);
+    });
+}
+
 Result<BuildReport> buildPoints(const PointSource& source, const std::string& store, const BuildSettings& settings) {
     if (!source.read || source.parts.empty())
         return Error{ErrorKind::usage, "has no points to read", source.name, "set parts and read"};
@@ -127,7 +174,8 @@ Result<BuildReport> buildPoints(const PointSource& source, const std::string& st
                    own.open = [&](const std::string&, const lod::ReadOptions&) -> ::stipple::Result<lod::PointSource> {
                        return taken(source);
                    };
-                   return lod::buildStore({source.name}, store, own, executor, progress);
+                   // (A key that no file can have: the name may be that of a folder.)
+                   return lod::buildStore({"/dev/null/points"}, store, own, executor, progress);
                });
 }
 

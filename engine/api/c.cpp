@@ -65,6 +65,15 @@ int stipple_build(const char* const* inputs, unsigned count, const char* store) 
     });
 }
 
+int stipple_build_bytes(const char* name, const void* bytes, uint64_t count, const char* store) {
+    return guarded([&] {
+        if (name == nullptr || bytes == nullptr || store == nullptr)
+            return refused("name, bytes and store must be given");
+        const auto built = v1::buildBytes({{name, bytes, count}}, store);
+        return built ? 0 : failed(built.error());
+    });
+}
+
 int stipple_device_open(const char* name, stipple_device** device) {
     return guarded([&] {
         if (device == nullptr) return refused("there is nowhere to put the device");

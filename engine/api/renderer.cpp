@@ -24,7 +24,15 @@ Result<Device> Device::open(const std::string& name, unsigned threads) {
 std::string Device::name() const { return held_->backend->device(); }
 
 struct Renderer::Held {
+    /// Of the settings of the last frame, so that its picture is read once.
+    struct Surroundings {
+        std::string path;
+        double scale = 0;
+        std::shared_ptr<const render::Environment> light;
+        std::shared_ptr<const render::Backdrop> backdrop;
+    };
     std::shared_ptr<Device::Held> device;  // ends last
+    Surroundings around;
     scene::OpenedScene scene;
     lod::ColourBy colour;
     std::unique_ptr<render::FrameState> state;
@@ -56,8 +64,37 @@ Error busy() {
     return {ErrorKind::usage, "draws for another thread", "device", "one thread at a time may draw on a device"};
 }
 
-::stipple::Result<render::FrameSettings> settingsOf(const RenderSettings& s, const scene::OpenedScene& scene,
-                                                    const lod::ColourBy& colour) {
+/// Light from all around, and what is seen behind the scene.
+::stipple::Result<void> surround(const RenderSettings& s, Renderer::Held& r, render::DrawSettings& draw) {
+    constexpr uint64_t kMemory = uint64_t{2} << 30;
+    const auto refuse = [](const std::string& what, const char* where) {
+        return fail(::stipple::ErrorKind::usage, what, where);
+    };
+    for (int c = 0; c < 3; ++c)
+        draw.background[c] =
+            shared::linearFromSrgb(static_cast<float>(s.background.at(static_cast<size_t>(c))) / 255.0f);
+    if (s.environment.empty() && s.environmentIsBackground)
+        return refuse("is the picture of environment, which is empty", "environmentIsBackground");
+    if (!s.environmentIsBackground) r.around.backdrop.reset();
+    if (s.environment.empty()) return {};
+    if (!(s.environmentScale >= 0 && s.environmentScale <= 1e6)) return refuse("is 0 to 1e6", "environmentScale");
+    Executor& executor = *r.device->executor;
+    if (r.around.path != s.environment || r.around.scale != s.environmentScale) {
+        Renderer::Held::Surroundings of{s.environment, s.environmentScale, {}, {}};
+        STIPPLE_ASSIGN(of.light, scene::openEnvironment(of.path, of.scale, kMemory, executor,
+                                                        scene::hasMirrors(r.scene.placed, {})));
+        r.around = std::move(of);
+    }
+    if (s.environmentIsBackground && !r.around.backdrop) {
+        STIPPLE_ASSIGN(r.around.backdrop, scene::openBackdrop(r.around.path, r.around.scale, kMemory, executor));
+    }
+    draw.environment = r.around.light;
+    if (s.environmentIsBackground) draw.backdrop = r.around.backdrop;
+    return {};
+}
+
+::stipple::Result<render::FrameSettings> settingsOf(const RenderSettings& s, Renderer::Held& r) {
+    const scene::OpenedScene& scene = r.scene;
     render::FrameSettings out;
     const auto refuse = [](const std::string& what, const char* where) {
         return fail(::stipple::ErrorKind::usage, what, where);
@@ -75,12 +112,10 @@ Error busy() {
     render::DrawSettings& draw = out.draw;
     draw.lights = scene.lights;
     draw.unlitTriangles = s.shade == "unlit";
-    draw.lit = scene::isLit(s.shade, scene.description, colour);
+    draw.lit = scene::isLit(s.shade, scene.description, r.colour);
     draw.worldUp = scene.description.up;
     draw.wind = {s.windShare, s.seconds, render::windAcross(draw.worldUp)};
-    for (int c = 0; c < 3; ++c)
-        draw.background[c] =
-            shared::linearFromSrgb(static_cast<float>(s.background.at(static_cast<size_t>(c))) / 255.0f);
+    STIPPLE_TRY(surround(s, r, draw));
     const render::EffectWishes wishes{s.effects, s.effectValues};
     STIPPLE_TRY(render::checkWishes(wishes));
     STIPPLE_TRY(
@@ -118,7 +153,7 @@ FrameInfo infoOf(const FrameCounters& c) {
         return fail(::stipple::ErrorKind::usage, "is not a size from 1x1 to 16384x16384",
                     std::to_string(width) + "x" + std::to_string(height));
     STIPPLE_ASSIGN(const scene::Camera eye, taken(camera));
-    STIPPLE_ASSIGN(const render::FrameSettings frame, settingsOf(settings, r.scene, r.colour));
+    STIPPLE_ASSIGN(const render::FrameSettings frame, settingsOf(settings, r));
     render::setSway(frame.draw.wind, r.state->hierarchies, r.state->instances, r.state->groups);
     const lod::View view = scene::makeView(eye, width, height, scene::nearPlaneOf(r.scene));
     if (waits) {

@@ -1,5 +1,5 @@
-// Effects on rows of surfaces: eye-dome lighting, fog, tone (shaders/shared). Included by kernels.inl, once per
-// instruction set.
+// Effects on rows of surfaces: eye-dome lighting, fog, tone, the background (shaders/shared). Included by kernels.inl,
+// once per instruction set.
 
 void edlLogs(const EdlConstants& constants, const float* __restrict depth, uint32_t n, float* __restrict out) {
     const float perDepth = kOrthographic ? constants.perDepth : 0.0f;
@@ -95,4 +95,49 @@ void toneRow(const ToneConstants& tone, uint32_t n, SurfaceRow& __restrict row) 
         row.green[i] = filmic(exposure * row.green[i]);
         row.blue[i] = filmic(exposure * row.blue[i]);
     }
+}
+
+void backgroundRow(const FrameConstants& frame, const BackgroundConstants& constants, const uint32_t* __restrict texels,
+                   uint32_t x0, uint32_t y, uint32_t n, SurfaceRow& __restrict row) {
+    const BackgroundConstants b = constants;
+    const Lens lens = lensHere(frame.focal);
+    const float inverseFocal = 1.0f / frame.focal, x = float(int(x0)) + 0.5f - frame.centre.x,
+                vy = (float(int(y)) + 0.5f - frame.centre.y) * inverseFocal;
+    alignas(64) float across[kTile], down[kTile], level[kTile];
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const vec3 ray = rayDirection(pixelRay(lens, (x + float(int(i))) * inverseFocal, vy));
+        const vec2 place = backdropPlace(backdropDirection(b, ray));
+        across[i] = place.x;
+        down[i] = place.y;
+        level[i] = backdropLevel(b, dot(ray, ray));
+    }
+    // Of a row about which the finest level is seen, all are of it.
+    float most = 0.0f;
+    for (size_t i = 0; i < n; ++i) most = max(most, level[i]);
+    const auto look = [&](uint32_t l, size_t i) {
+        const BackdropTaps t =
+            backdropTaps(b.first[l], backdropSize(b.width, l), backdropSize(b.height, l), vec2(across[i], down[i]));
+        return mixTaps(t, backdropLight(texels[t.at00]), backdropLight(texels[t.at10]), backdropLight(texels[t.at01]),
+                       backdropLight(texels[t.at11]));
+    };
+    const auto show = [&](size_t i, const vec3& fine, const vec3& coarse, float between) {
+        const vec3 c = backdropShown(b, fine, coarse, between);
+        row.behindRed[i] = c.x;
+        row.behindGreen[i] = c.y;
+        row.behindBlue[i] = c.z;
+    };
+    if (!(most > 0.0f))
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const vec3 c = look(0u, i);
+            show(i, c, c, 0.0f);
+        }
+    else
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const auto fine = uint32_t(int(level[i]));
+            const uint32_t coarse = fine + 1u < b.levels ? fine + 1u : fine;
+            show(i, look(fine, i), look(coarse, i), level[i] - float(int(fine)));
+        }
 }

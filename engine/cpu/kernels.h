@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "shaders/shared/background.h"
 #include "shaders/shared/curve.h"
 #include "shaders/shared/edl.h"
 #include "shaders/shared/ewa.h"
@@ -281,6 +282,8 @@ struct SurfaceRow {
     bool hasTriangles, hasEmission, hasCoverage, hasMaterials;
     bool hasOcclusion;  ///< of points, too
     bool hasOpacity;    ///< some pixels may be kPixelBlends
+    bool hasBehind;     ///< what is not covered shows these, and not one colour
+    alignas(64) float behindRed[kTile], behindGreen[kTile], behindBlue[kTile];
 };
 /// What of a surface is needed beyond whether there is one, and its colour.
 struct SurfaceWants {
@@ -375,6 +378,9 @@ struct Kernels {
     void (*fogRow)(const shared::FrameConstants& f, const shared::FogConstants& c, uint32_t x0, uint32_t y, uint32_t n,
                    SurfaceRow& row);
     void (*toneRow)(const shared::ToneConstants& c, uint32_t n, SurfaceRow& row);
+    /// What is behind the row's pixels (row.behindRed ...); `texels`: of the backdrop.
+    void (*backgroundRow)(const shared::FrameConstants& f, const shared::BackgroundConstants& c, const uint32_t* texels,
+                          uint32_t x0, uint32_t y, uint32_t n, SurfaceRow& row);
     /// Offers the triangles of one cluster (places from firstPlace on) to the visibility buffer.
     void (*rasterCluster)(const shared::FrameConstants& f, const shared::SurfaceMaterial* materials,
                           const MeshBlock& block, uint32_t firstPlace, const LargeSink& large,

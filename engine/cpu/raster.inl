@@ -39,11 +39,21 @@ struct Fixed {
     offerKey(visibility, pixel, visibilityKey(floatBitsToUint(depthOfLinear(lensHere(1.0f), linear)), id));
 }
 
-/// Pixels [fromX, toX] x [fromY, toY] of a triangle. `Int`: holds twice the area of the triangle and the box.
-/// `keep(x, y)`: false where an alpha mask cuts the triangle out.
-template <typename Int, typename Keep>
+/// Pixels of a row of a triangle with an alpha mask that are in front, before it is known whether they are cut out.
+struct MaskedRow {
+    uint32_t count = 0;
+    alignas(64) int x[kTile];
+    alignas(64) uint32_t isKept[kTile];
+    alignas(64) float alpha[kTile];
+    UvRow uv;
+    uint64_t key[kTile];
+};
+
+/// Pixels [fromX, toX] x [fromY, toY] of a triangle. `Int`: holds twice the area of the triangle and the box. `mask`:
+/// says which pixels of a row are there (MaskedRow::isKept); KeepAll: all.
+template <typename Int, typename Mask>
 [[gnu::always_inline]] inline void fill(const Fixed& t, int fromX, int toX, int fromY, int toY, uint32_t stride,
-                                        const Visibility& visibility, const Keep& keep) {
+                                        const Visibility& visibility, const Mask& mask) {
     constexpr int kOne = 256, kHalf = 128;  // kSubpixel
     const int64_t cx = int64_t{fromX} * kOne + kHalf, cy = int64_t{fromY} * kOne + kHalf;
     Int dx[3], dy[3], row[3];
@@ -62,17 +72,36 @@ template <typename Int, typename Keep>
     const float z0 = t.inverseDepth[0] * inverseArea, z1 = t.inverseDepth[1] * inverseArea,
                 z2 = t.inverseDepth[2] * inverseArea;
     const float moved = (isMoved[0] ? z0 : 0.0f) + (isMoved[1] ? z1 : 0.0f) + (isMoved[2] ? z2 : 0.0f);
+    MaskedRow masked;
+    const auto offerMasked = [&](int y) {
+        if (masked.count == 0) return;
+        mask(y, masked);
+        for (uint32_t i = 0; i < masked.count; ++i)
+            if (masked.isKept[i] != 0u)
+                offerKey(visibility, static_cast<size_t>(y) * stride + static_cast<size_t>(masked.x[i]), masked.key[i]);
+        masked.count = 0;
+    };
     for (int y = fromY; y <= toY; ++y) {
         Int w0 = row[0], w1 = row[1], w2 = row[2];
         for (int x = fromX; x <= toX; ++x) {
-            if ((w0 | w1 | w2) >= 0 && keep(x, y))
-                offer(visibility, static_cast<size_t>(y) * stride + static_cast<size_t>(x),
-                      static_cast<float>(w0) * z0 + static_cast<float>(w1) * z1 + static_cast<float>(w2) * z2 + moved,
-                      t.id);
+            if ((w0 | w1 | w2) >= 0) {
+                const size_t pixel = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
+                const float linear =
+                    static_cast<float>(w0) * z0 + static_cast<float>(w1) * z1 + static_cast<float>(w2) * z2 + moved;
+                const uint64_t key = visibilityKey(floatBitsToUint(depthOfLinear(lensHere(1.0f), linear)), t.id);
+                if (Mask::kKeepsAll) {
+                    offerKey(visibility, pixel, key);
+                } else if (key < __atomic_load_n(&visibility.keys[pixel], __ATOMIC_RELAXED)) {
+                    masked.x[masked.count] = x;
+                    masked.key[masked.count++] = key;
+                    if (masked.count == kTile) offerMasked(y);
+                }
+            }
             w0 += dx[0];
             w1 += dx[1];
             w2 += dx[2];
         }
+        if (!Mask::kKeepsAll) offerMasked(y);
         row[0] += dy[0];
         row[1] += dy[1];
         row[2] += dy[2];
@@ -87,39 +116,52 @@ struct MaskInput {
     vec3 corners[3];
 };
 
-bool isKept(const FrameConstants& f, const MaskInput& m, int x, int y) {
+void keepMasked(const FrameConstants& frame, const MaskInput& m, int y, MaskedRow& __restrict row) {
+    const FrameConstants f = frame;
     const float inverseFocal = 1.0f / f.focal;
-    const PixelRay ray = pixelRay(lensHere(f.focal), (float(x) + 0.5f - f.centre.x) * inverseFocal,
-                                  (float(y) + 0.5f - f.centre.y) * inverseFocal);
-    const vec3 &a = m.corners[0], &b = m.corners[1], &c = m.corners[2];
-    const MeshVertex &va = *m.vertices[0], &vb = *m.vertices[1], &vc = *m.vertices[2];
-    const vec2 w = triangleWeights(rayDirection(ray), fromRay(ray, a), fromRay(ray, b), fromRay(ray, c));
-    const float wa = 1.0f - w.x - w.y;
+    const vec3 a = m.corners[0], b = m.corners[1], c = m.corners[2];
+    const MeshVertex va = *m.vertices[0], vb = *m.vertices[1], vc = *m.vertices[2];
     const auto alphaOf = [](const MeshVertex& v) { return float(int(v.colour >> 24)) * (1.0f / 255.0f); };
-    float alpha = m.material->alpha * (wa * alphaOf(va) + w.x * alphaOf(vb) + w.y * alphaOf(vc));
-    if (m.material->baseTexture.texture != 0) {
-        const float footprint = uvFootprint(ray, inverseFocal, a, vec3(b.x - a.x, b.y - a.y, b.z - a.z),
-                                            vec3(c.x - a.x, c.y - a.y, c.z - a.z), vec2(vb.u - va.u, vb.v - va.v),
-                                            vec2(vc.u - va.u, vc.v - va.v));
-        float texel = 1;
-        if (sampleAlpha(*m.textures, m.material->baseTexture, wa * va.u + w.x * vb.u + w.y * vc.u,
-                        wa * va.v + w.x * vb.v + w.y * vc.v, footprint, texel))
-            alpha *= texel;
+    const float alphaA = alphaOf(va), alphaB = alphaOf(vb), alphaC = alphaOf(vc), all = m.material->alpha;
+    const float ey = (float(y) + 0.5f - f.centre.y) * inverseFocal;
+    const size_t n = row.count;
+    UvRow& uv = row.uv;
+    float* __restrict const alpha = row.alpha;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const PixelRay ray = pixelRay(lensHere(f.focal), (float(row.x[i]) + 0.5f - f.centre.x) * inverseFocal, ey);
+        const vec2 w = triangleWeights(rayDirection(ray), fromRay(ray, a), fromRay(ray, b), fromRay(ray, c));
+        const float wa = 1.0f - w.x - w.y;
+        alpha[i] = all * (wa * alphaA + w.x * alphaB + w.y * alphaC);
+        uv.u[i] = wa * va.u + w.x * vb.u + w.y * vc.u;
+        uv.v[i] = wa * va.v + w.x * vb.v + w.y * vc.v;
+        uv.footprint[i] = uvFootprint(ray, inverseFocal, a, vec3(b.x - a.x, b.y - a.y, b.z - a.z),
+                                      vec3(c.x - a.x, c.y - a.y, c.z - a.z), vec2(vb.u - va.u, vb.v - va.v),
+                                      vec2(vc.u - va.u, vc.v - va.v));
     }
-    return alpha >= m.material->alphaCutoff;
+    if (m.material->baseTexture.texture != 0) sampleAlphas(*m.textures, m.material->baseTexture, uv, 0, n, alpha);
+    const float cutoff = m.material->alphaCutoff;
+    for (size_t i = 0; i < n; ++i) row.isKept[i] = alpha[i] >= cutoff ? 1u : 0u;
 }
 
 constexpr int64_t kSmallSteps = 40 * 256;           ///< triangles up to this wide are filled in 32 bits
 constexpr int64_t kLargePixels = int64_t{1} << 14;  ///< from this many pixels on a triangle is shared out by rows
 
 struct KeepAll {
-    bool operator()(int, int) const { return true; }
+    static constexpr bool kKeepsAll = true;
+    void operator()(int, MaskedRow&) const {}
+};
+struct KeepMasked {
+    static constexpr bool kKeepsAll = false;
+    const FrameConstants& f;
+    const MaskInput& input;
+    void operator()(int y, MaskedRow& row) const { keepMasked(f, input, y, row); }
 };
 
 /// Rows [firstRow, lastRow] of a triangle.
-template <typename Keep = KeepAll>
+template <typename Mask = KeepAll>
 void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, const Visibility& visibility,
-              const Keep& keep = {}) {
+              const Mask& mask = {}) {
     const auto least = [](const int64_t* v) {
         return v[0] < v[1] ? (v[0] < v[2] ? v[0] : v[2]) : (v[1] < v[2] ? v[1] : v[2]);
     };
@@ -135,9 +177,9 @@ void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow
     toY = toY > lastRow ? lastRow : toY;
     if (fromX > toX || fromY > toY) return;
     if (maxX - minX < kSmallSteps && maxY - minY < kSmallSteps)
-        fill<int32_t>(t, fromX, toX, fromY, toY, f.width, visibility, keep);
+        fill<int32_t>(t, fromX, toX, fromY, toY, f.width, visibility, mask);
     else
-        fill<int64_t>(t, fromX, toX, fromY, toY, f.width, visibility, keep);
+        fill<int64_t>(t, fromX, toX, fromY, toY, f.width, visibility, mask);
 }
 
 /// What one triangle needs beside its corners.
@@ -160,7 +202,7 @@ void takeTriangle(const FrameConstants& f, Fixed& t, const Candidate& of, const 
     }
     const int last = static_cast<int>(f.height) - 1;
     if (of.mask != nullptr) {
-        fillRows(f, t, 0, last, visibility, [&](int x, int y) { return isKept(f, *of.mask, x, y); });
+        fillRows(f, t, 0, last, visibility, KeepMasked{f, *of.mask});
     } else if ((area < 0 ? -area : area) > kLargePixels * 65536 * 2) {
         LargeTriangle l{};
         for (int k = 0; k < 3; ++k) {

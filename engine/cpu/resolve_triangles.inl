@@ -121,15 +121,15 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
 void blendRun(const MaterialRun& run, const Corners& c, const UvRow& uv, const float* wb, const float* wc,
               MaterialRow& __restrict s) {
     const SurfaceMaterial& material = *run.material;
-    for (size_t i = run.first; i < run.first + run.n; ++i) {
-        const auto alphaOf = [&](size_t k) { return float(int(c.colour[k][i] >> 24)) * (1.0f / 255.0f); };
-        float alpha = material.alpha * ((1.0f - wb[i] - wc[i]) * alphaOf(0) + wb[i] * alphaOf(1) + wc[i] * alphaOf(2)),
-              texel = 1;
-        if (material.baseTexture.texture != 0 &&
-            sampleAlpha(*run.textures, material.baseTexture, uv.u[i], uv.v[i], uv.footprint[i], texel))
-            alpha *= texel;
-        s.occlusion[i] = alpha;
+    alignas(64) float alpha[kTile];
+    for (size_t k = 0; k < run.n; ++k) {
+        const size_t i = run.first + k;
+        const auto alphaOf = [&](size_t of) { return float(int(c.colour[of][i] >> 24)) * (1.0f / 255.0f); };
+        alpha[k] = material.alpha * ((1.0f - wb[i] - wc[i]) * alphaOf(0) + wb[i] * alphaOf(1) + wc[i] * alphaOf(2));
     }
+    if (material.baseTexture.texture != 0)
+        sampleAlphas(*run.textures, material.baseTexture, uv, run.first, run.n, alpha);
+    for (size_t k = 0; k < run.n; ++k) s.occlusion[run.first + k] = alpha[k];
 }
 
 /// What is known of the pixels of a row that show triangles.

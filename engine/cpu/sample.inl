@@ -69,11 +69,12 @@ void mixLevels(const TapRow& __restrict fine, const TapRow& __restrict coarse, c
     }
 }
 
-/// `slot` names a texture; n coordinates from `first` on, results from there on as well.
-void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, size_t first, size_t n,
-               SampledRow& out) {
+/// The texels of two levels about n coordinates from `first` on (at entries from 0 on), and how far between them. What
+/// is not there yet is taken from the finest level that is.
+void findTexels(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, size_t first, size_t n, TapRow& fine,
+                TapRow& coarse, float* __restrict between, uint32_t* __restrict isThere) {
     const TextureInfo& info = set.infos[slot.texture - 1];
-    alignas(64) float u[kTile], v[kTile], between[kTile];
+    alignas(64) float u[kTile], v[kTile];
     alignas(64) uint32_t level[kTile], coarser[kTile];
     const uint32_t last = info.levels - 1;
     const float size = float(int(info.width > info.height ? info.width : info.height)), highest = float(int(last));
@@ -87,10 +88,8 @@ void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, 
         between[i] = lod - float(int(level[i]));
         coarser[i] = level[i] < last ? level[i] + 1 : last;
     }
-    TapRow fine, coarse;
     findTaps(info, level, u, v, n, fine);
     findTaps(info, coarser, u, v, n, coarse);
-    alignas(64) uint32_t isThere[kTile];
     for (size_t i = 0; i < n; ++i) {
         const uint32_t* tile = set.tiles[fine.tile[i]];
         isThere[i] = 1;
@@ -118,8 +117,17 @@ void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, 
             fetch(next, i, coarse);
         }
     }
+}
+
+/// `slot` names a texture; n coordinates from `first` on, results from there on as well.
+void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, size_t first, size_t n,
+               SampledRow& out) {
+    TapRow fine, coarse;
+    alignas(64) float between[kTile];
+    alignas(64) uint32_t isThere[kTile];
+    findTexels(set, slot, uv, first, n, fine, coarse, between, isThere);
     SampledRow compact;
-    if (info.isColour != 0)
+    if (set.infos[slot.texture - 1].isColour != 0)
         mixLevels<true>(fine, coarse, between, n, compact);
     else
         mixLevels<false>(fine, coarse, between, n, compact);
@@ -132,31 +140,16 @@ void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, 
     }
 }
 
-/// Alpha alone, of one place; false if nothing is there yet.
-inline bool sampleAlpha(const TextureSet& set, const TextureSlot& slot, float u, float v, float footprint,
-                        float& alpha) {
-    const TextureInfo& info = set.infos[slot.texture - 1];
-    const float su = placed(slot.rowU.x * u + slot.rowU.y * v + slot.rowU.z),
-                sv = placed(slot.rowV.x * u + slot.rowV.y * v + slot.rowV.z);
-    const uint32_t size = info.width > info.height ? info.width : info.height;
-    const float lod = min(textureLod(footprint * static_cast<float>(size)), static_cast<float>(info.levels - 1));
-    const auto at = [&](uint32_t level, float& value) {
-        const TextureTap tap = textureTap(info, info.firstTile[level], level, su, sv);
-        const uint32_t* texel = set.tiles[tap.tile];
-        if (texel == nullptr) return false;
-        texel += tap.y * kTileEdge + tap.x;
-        const auto of = [&](size_t k) { return float(int(texel[k] >> 24)) * (1.0f / 255.0f); };
-        const float upper = of(0) + (of(1) - of(0)) * tap.fx,
-                    lower = of(kTileEdge) + (of(kTileEdge + 1) - of(kTileEdge)) * tap.fx;
-        value = upper + (lower - upper) * tap.fy;
-        return true;
-    };
-    uint32_t level = static_cast<uint32_t>(lod);
-    const float between = lod - static_cast<float>(level);
-    const bool isExact = at(level, alpha);
-    bool isThere = isExact;
-    while (!isThere && level + 1 < info.levels) isThere = at(++level, alpha);
-    float coarse = 0;
-    if (isExact && between > 0 && level + 1 < info.levels && at(level + 1, coarse)) alpha += (coarse - alpha) * between;
-    return isThere;
+/// Alphas times what a texture has at n coordinates from `first` on, where something is there yet.
+void sampleAlphas(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, size_t first, size_t n,
+                  float* __restrict alpha) {
+    TapRow fine, coarse;
+    alignas(64) float between[kTile];
+    alignas(64) uint32_t isThere[kTile];
+    findTexels(set, slot, uv, first, n, fine, coarse, between, isThere);
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const float near = bilinear<false>(fine, i, 24u), far = bilinear<false>(coarse, i, 24u);
+        alpha[i] *= isThere[i] != 0u ? near + (far - near) * between[i] : 1.0f;
+    }
 }

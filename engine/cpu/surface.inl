@@ -172,6 +172,18 @@ void debugColours(const FrameConstants& f, uint32_t n, const SurfaceRow& __restr
     }
 }
 
+/// Colours over what is behind them; `share`: of the pixel, null: all of it where anything is.
+void overBehind(const SurfaceRow& __restrict row, const float* __restrict share, uint32_t n, float* __restrict red,
+                float* __restrict green, float* __restrict blue) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const float own = row.depth[i] > 0.0f ? (share != nullptr ? share[i] : 1.0f) : 0.0f;
+        red[i] = own > 0.0f ? row.behindRed[i] + own * (red[i] - row.behindRed[i]) : row.behindRed[i];
+        green[i] = own > 0.0f ? row.behindGreen[i] + own * (green[i] - row.behindGreen[i]) : row.behindGreen[i];
+        blue[i] = own > 0.0f ? row.behindBlue[i] + own * (blue[i] - row.behindBlue[i]) : row.behindBlue[i];
+    }
+}
+
 void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, const SurfaceRow& __restrict row,
                const ShadeOutput& out) {
     const FrameConstants f = frame;
@@ -190,17 +202,24 @@ void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, co
     alignas(64) float share[kTile];
     if (hasShare)
 #pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) {
+        for (size_t i = 0; i < n; ++i)
             share[i] =
                 (row.hasCoverage ? row.coverage[i] : 1.0f) * (row.hasOpacity ? wordOpacity(row.material[i]) : 1.0f);
+    if (row.hasBehind) {
+        overBehind(row, hasShare ? share : nullptr, n, red, green, blue);
+    } else if (hasShare) {
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
             red[i] = f.background.x + share[i] * (red[i] - f.background.x);
             green[i] = f.background.y + share[i] * (green[i] - f.background.y);
             blue[i] = f.background.z + share[i] * (blue[i] - f.background.z);
         }
-        // max(0, v) of what is no number is 0: these index a table.
+    }
+    const bool isWhole = row.hasBehind;
+    // max(0, v) of what is no number is 0: these index a table.
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const bool valid = row.depth[i] > 0.0f;
+        const bool valid = isWhole | (row.depth[i] > 0.0f);
         red[i] = valid ? red[i] : f.background.x;
         green[i] = valid ? green[i] : f.background.y;
         blue[i] = valid ? blue[i] : f.background.z;

@@ -53,6 +53,7 @@ Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const R
     if (draws.hasSurfaces()) STIPPLE_TRY(prepareMeshes(draws, residents));
     if (!draws.lights.empty()) STIPPLE_TRY(fill(kLightsBinding, draws.lights.data(), draws.lights.size(), "lights"));
     STIPPLE_TRY(prepareEnvironment(draws.environment));
+    STIPPLE_TRY(prepareBackdrop(draws.backdrop));
     STIPPLE_TRY(prepareShadows(draws));
     if (draws.glass) STIPPLE_TRY(prepareLayer(*draws.glass));
     STIPPLE_TRY(prepareEffects(draws));
@@ -168,6 +169,14 @@ Result<void> FrameBuffers::prepareEnvironment(const std::shared_ptr<const render
     return {};
 }
 
+/// The same of a picture behind everything.
+Result<void> FrameBuffers::prepareBackdrop(const std::shared_ptr<const render::Backdrop>& backdrop) {
+    if (!backdrop || backdrop == backdrop_) return {};
+    STIPPLE_TRY(fill(kBackdropBinding, backdrop->texels.data(), backdrop->texels.size(), "backdrop"));
+    backdrop_ = backdrop;
+    return {};
+}
+
 /// Maps of lights that cast shadows, and the table of where they are.
 Result<void> FrameBuffers::prepareShadows(const render::DrawList& draws) {
     if (!draws.isShadowed) return {};
@@ -214,6 +223,7 @@ void FrameBuffers::releaseIdle(const render::DrawList& draws) {
         bound_.at(binding) = Buffer();
         descriptorsChanged_ = true;
         if (binding == kEnvironmentBinding) environment_.reset();
+        if (binding == kBackdropBinding) backdrop_.reset();
         if (binding == kShadowBinding) shadows_.clear();
     };
     for (size_t e = 0; e < idle_.size(); ++e) {

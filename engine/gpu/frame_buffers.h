@@ -57,6 +57,7 @@ class FrameBuffers {
     Result<void> prepareLists(const render::RenderRequest& request);
     Result<void> prepareMeshes(const render::DrawList& draws, const Residents& residents);
     Result<void> prepareEnvironment(const std::shared_ptr<const render::Environment>& environment);
+    Result<void> prepareBackdrop(const std::shared_ptr<const render::Backdrop>& backdrop);
     Result<void> prepareShadows(const render::DrawList& draws);
     Result<void> prepareLayer(const render::LayerTables& layer);
     Result<void> prepareEffects(const render::DrawList& draws);
@@ -70,6 +71,7 @@ class FrameBuffers {
     VkDescriptorSet set_;
     std::array<Buffer, shared::kBindings> bound_;
     std::shared_ptr<const render::Environment> environment_;  ///< that is in its buffer
+    std::shared_ptr<const render::Backdrop> backdrop_;        ///< likewise
     Buffer readback_, staging_, nothing_;
     std::vector<Level> levels_;
     uint32_t texelsOfPixels_ = 0;

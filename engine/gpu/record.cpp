@@ -5,6 +5,7 @@
 
 #include "engine/base/check.h"
 #include "engine/gpu/passes/passes.h"
+#include "shaders/shared/background.h"
 
 namespace stipple::gpu {
 
@@ -30,6 +31,7 @@ Result<void> Recording::recordPasses() {
         size_t next = p + 1;
         std::string shader = shader_, label = label_;
         for (size_t q = p + 1; q < passes.size() && render::passInfo(passes[q]).isOfOwnPixel; ++q) {
+            if (gpuPassOf(passes[q]).isBeside) continue;
             shader += std::string("_") + render::passName(passes[q]);
             label += std::string("+") + render::passName(passes[q]);
             if (shaderNamed(shader) == nullptr) continue;
@@ -37,6 +39,8 @@ Result<void> Recording::recordPasses() {
             label_ = label;
             next = q + 1;
         }
+        for (size_t q = p + 1; q < next; ++q)
+            if (gpuPassOf(passes[q]).isBeside) gpuPassOf(passes[q]).record(*this);
         gpuPassOf(passes[next - 1]).record(*this);
         p = next;
     }
@@ -68,6 +72,7 @@ shared::Step Recording::stepAt(size_t level) const {
     step.hasWideDiscs = has(render::Pass::discs) || (isSmoothing_ && draws().hasWideDiscs) ? 1 : 0;
     step.exactPoints = render::reconstructionOf(request_.mode).fillsSplats && !isSmoothing_ ? 1 : 0;
     step.hasFiltered = has(render::Pass::ewa) ? 1 : 0;
+    step.hasBackground = draws().tableAt<shared::BackgroundConstants>(shared::kBackgroundBinding) != nullptr ? 1 : 0;
     step.onlySmooth = isSmoothing_ ? 1 : 0;
     step.hasSmooth = hasSmooth && levels.size() > 1 ? 1 : 0;
     step.smoothTexels = levels[0].offset;

@@ -4,6 +4,7 @@
 
 #include "engine/base/check.h"
 #include "engine/gpu/mesh_frame.h"
+#include "shaders/shared/background.h"
 #include "shaders/shared/edl.h"
 #include "shaders/shared/ewa.h"
 #include "shaders/shared/fog.h"
@@ -76,6 +77,8 @@ static_assert(isLaidOut(shared::kToneBinding, sizeof(shared::ToneConstants)));
 static_assert(isLaidOut(shared::kOcclusionBinding, sizeof(shared::OcclusionConstants)));
 static_assert(isLaidOut(shared::kOpenBinding, sizeof(float)));
 static_assert(isLaidOut(shared::kShadowBinding, sizeof(shared::ShadowTable)));
+static_assert(isLaidOut(shared::kBackgroundBinding, sizeof(shared::BackgroundConstants)));
+static_assert(isLaidOut(shared::kBackdropBinding, sizeof(uint32_t)));
 #endif
 
 }  // namespace

@@ -226,6 +226,7 @@ glm::ivec2 webpSize(const std::vector<uint8_t>& b) {
 
 /// What the module says, without its library's own words.
 std::string plainReason(const std::string& text) {
+    if (text.ends_with(kStippleOiioFilesOnly)) return text;
     if (text.find("OpenImageIO") != std::string::npos || text.find("format reader") != std::string::npos)
         return "is no picture that can be read (.png, .jpg, .webp, .exr, .hdr)";
     return "cannot be read: " + text.substr(0, text.find('\n'));
@@ -265,27 +266,75 @@ Result<render::Image> readRgba(const std::string& name, const Promise& promise, 
     return image;
 }
 
-/// Of a regular file (the library would wait for ever at a FIFO).
-Result<Promise> promiseOfFile(const std::string& path) {
-    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
-    const auto file = std::make_shared<const InputFile>(std::move(opened));
+/// Of bytes that outlive the promise.
+Result<Promise> promiseOfSource(const ByteSource& file) {
     std::array<uint8_t, 64> head{};
-    const auto count = static_cast<size_t>(std::min<uint64_t>(head.size(), file->sizeBytes()));
-    if (count == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
-    STIPPLE_TRY(file->readAt(0, head.data(), count));
-    Promise promise = promiseOf(head.data(), count, file->sizeBytes());
+    const auto count = static_cast<size_t>(std::min<uint64_t>(head.size(), file.sizeBytes()));
+    if (count == 0) return fail(ErrorKind::input, "is empty", file.path(), "is the download complete?");
+    STIPPLE_TRY(file.readAt(0, head.data(), count));
+    Promise promise = promiseOf(head.data(), count, file.sizeBytes());
     if (isPng(head.data(), count))
-        promise.readAt = [file](uint64_t at, void* to, size_t n) { return file->readAt(at, to, n); };
+        promise.readAt = [&file](uint64_t at, void* to, size_t n) { return file.readAt(at, to, n); };
     return promise;
+}
+
+/// WebP is decoded when it is opened.
+Result<void> checkWebp(const std::vector<uint8_t>& bytes, const Promise& promise, const std::string& name,
+                       uint64_t memoryBytes) {
+    const glm::ivec2 size = std::strcmp(promise.format, "webp") == 0 ? webpSize(bytes) : glm::ivec2(0);
+    if (size.x <= 0) return {};
+    return checkSize(size.x, size.y, 4, promise, name, memoryBytes);
+}
+
+/// A picture's bytes as a whole, for a library that reads files and memory only. Takes them from the memory allowed.
+Result<std::vector<uint8_t>> wholeOf(const ByteSource& file, uint64_t& memoryBytes) {
+    if (file.sizeBytes() > memoryBytes)
+        return fail(ErrorKind::budget,
+                    fmt::format("its {} are read as a whole, but {} are left for it", humanBytes(file.sizeBytes()),
+                                humanBytes(memoryBytes)),
+                    file.path(), "give more --memory, or make the picture smaller");
+    std::vector<uint8_t> bytes(file.sizeBytes());
+    STIPPLE_TRY(file.readAt(0, bytes.data(), bytes.size()));
+    memoryBytes -= bytes.size();
+    return bytes;
+}
+
+Result<render::HdrImage> readFloats(const std::string& path, const std::vector<uint8_t>* bytes, const Promise& promise,
+                                    uint64_t memoryBytes) {
+    if (!module().readFloat)
+        return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, path);
+    render::HdrImage image;
+    const auto call = [&](int* w, int* h, float* pixels, char* error, int errorBytes) {
+        return module().readFloat(path.c_str(), bytes ? bytes->data() : nullptr, bytes ? bytes->size() : 0, w, h,
+                                  pixels, error, errorBytes);
+    };
+    STIPPLE_TRY((readWith<float>(path, promise, 3 * sizeof(float), memoryBytes, call, [&](uint32_t w, uint32_t h) {
+        image.width = w;
+        image.height = h;
+        image.rgb.resize(size_t{w} * h * 3);
+        return image.rgb.data();
+    })));
+    return image;
 }
 
 }  // namespace
 
 Result<render::Image> readImage(const std::string& path, uint64_t memoryBytes) {
-    STIPPLE_ASSIGN(const Promise promise, promiseOfFile(path));
-    return readRgba(path, promise, memoryBytes, [&](int* w, int* h, unsigned char* pixels, char* error, int bytes) {
-        return module().read(path.c_str(), w, h, pixels, error, bytes);
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));  // (the library would wait for ever at a FIFO)
+    STIPPLE_ASSIGN(const Promise promise, promiseOfSource(file));
+    return readRgba(path, promise, memoryBytes, [&](int* w, int* h, unsigned char* pixels, char* error, int count) {
+        return module().read(path.c_str(), nullptr, 0, w, h, pixels, error, count);
     });
+}
+
+Result<render::Image> readImage(const ByteSource& file, uint64_t memoryBytes) {
+    STIPPLE_ASSIGN(const Promise promise, promiseOfSource(file));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, wholeOf(file, memoryBytes));
+    STIPPLE_TRY(checkWebp(bytes, promise, file.path(), memoryBytes));
+    return readRgba(
+        file.path(), promise, memoryBytes, [&](int* w, int* h, unsigned char* pixels, char* error, int count) {
+            return module().read(file.path().c_str(), bytes.data(), bytes.size(), w, h, pixels, error, count);
+        });
 }
 
 Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name, uint64_t memoryBytes) {
@@ -295,29 +344,23 @@ Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::
             std::memcpy(to, bytes.data() + at, n);
             return {};
         };
-    if (std::strcmp(promise.format, "webp") == 0)
-        if (const glm::ivec2 size = webpSize(bytes); size.x > 0)
-            STIPPLE_TRY(checkSize(size.x, size.y, 4, promise, name, memoryBytes));
+    STIPPLE_TRY(checkWebp(bytes, promise, name, memoryBytes));
     return readRgba(name, promise, memoryBytes, [&](int* w, int* h, unsigned char* pixels, char* error, int count) {
         return module().decode(promise.format, bytes.data(), bytes.size(), w, h, pixels, error, count);
     });
 }
 
 Result<render::HdrImage> readHdr(const std::string& path, uint64_t memoryBytes) {
-    STIPPLE_ASSIGN(const Promise promise, promiseOfFile(path));
-    if (!module().readFloat)
-        return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, path);
-    render::HdrImage image;
-    const auto call = [&](int* w, int* h, float* pixels, char* error, int bytes) {
-        return module().readFloat(path.c_str(), w, h, pixels, error, bytes);
-    };
-    STIPPLE_TRY((readWith<float>(path, promise, 3 * sizeof(float), memoryBytes, call, [&](uint32_t w, uint32_t h) {
-        image.width = w;
-        image.height = h;
-        image.rgb.resize(size_t{w} * h * 3);
-        return image.rgb.data();
-    })));
-    return image;
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    STIPPLE_ASSIGN(const Promise promise, promiseOfSource(file));
+    return readFloats(path, nullptr, promise, memoryBytes);
+}
+
+Result<render::HdrImage> readHdr(const ByteSource& file, uint64_t memoryBytes) {
+    STIPPLE_ASSIGN(const Promise promise, promiseOfSource(file));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, wholeOf(file, memoryBytes));
+    STIPPLE_TRY(checkWebp(bytes, promise, file.path(), memoryBytes));
+    return readFloats(file.path(), &bytes, promise, memoryBytes);
 }
 
 }  // namespace stipple::image

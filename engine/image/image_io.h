@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/byte_source.h"
 #include "engine/base/result.h"
 #include "engine/image/transfer.h"
 #include "engine/render/backend.h"
@@ -22,11 +23,15 @@ Result<std::vector<char>> encodeImage(const std::string& path, const render::Ima
 constexpr uint64_t kPictureMemory = uint64_t{4} << 30;
 /// 8-bit RGBA; files without alpha are opaque.
 Result<render::Image> readImage(const std::string& path, uint64_t memoryBytes = kPictureMemory);
+/// The same of bytes from anywhere, which are read as a whole; what their name ends in says the format where they do
+/// not. A format that is read from files only is refused by its name.
+Result<render::Image> readImage(const ByteSource& file, uint64_t memoryBytes = kPictureMemory);
 /// Decodes an image that stands in memory (PNG, JPEG, ...); `name` is for messages.
 Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name,
                                   uint64_t memoryBytes = kPictureMemory);
 /// Linear floats, e.g. of .hdr and .exr.
 Result<render::HdrImage> readHdr(const std::string& path, uint64_t memoryBytes = kPictureMemory);
+Result<render::HdrImage> readHdr(const ByteSource& file, uint64_t memoryBytes = kPictureMemory);
 /// Is there what reads and writes pictures? Where `load` is given, by loading it.
 Result<void> checkModule(bool load);
 /// Can this extension be written? An error that names those that can, if not.

@@ -77,9 +77,34 @@ bool tellSize(const OIIO::ImageSpec& spec, bool hasRoom, int* width, int* height
 }
 constexpr const char* kChanged = "it changed while it was read";
 
+/// Opens a file, or bytes under a file's name (whose ending is tried first, then every format that knows what they
+/// begin with).
+class Opened {
+  public:
+    Opened(const char* path, const void* bytes, unsigned long count, OIIO::ImageSpec config)
+        : memory_(const_cast<void*>(bytes), count) {
+        OIIO::Filesystem::IOProxy* proxy = bytes != nullptr ? &memory_ : nullptr;
+        if (proxy != nullptr) config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);  // of some it is asked so
+        in_ = OIIO::ImageInput::open(path, &config, proxy);
+        if (in_) return;
+        problem_ = OIIO::geterror();
+        if (bytes == nullptr) return;
+        const std::string format = OIIO::Filesystem::extension(path, false);
+        if (const auto reader = OIIO::ImageInput::create(format); reader && reader->supports("ioproxy") == 0)
+            problem_ = std::string(reader->format_name()) + " " + kStippleOiioFilesOnly;
+        OIIO::geterror();  // where there is no such format
+    }
+    OIIO::ImageInput* get() const { return in_.get(); }
+    const std::string& problem() const { return problem_; }
+
+  private:
+    OIIO::Filesystem::IOMemReader memory_;
+    std::unique_ptr<OIIO::ImageInput> in_;
+    std::string problem_;
+};
+
 /// The rest of both ways to read: size, then RGBA bytes.
 int readRgba(OIIO::ImageInput* in, int* width, int* height, unsigned char* pixels, char* error, int errorBytes) {
-    if (!in) return report(OIIO::geterror(), error, errorBytes);
     const OIIO::ImageSpec& spec = in->spec();
     if (!tellSize(spec, pixels != nullptr, width, height)) return report(kChanged, error, errorBytes);
     if (pixels == nullptr) return 0;
@@ -98,12 +123,13 @@ int readRgba(OIIO::ImageInput* in, int* width, int* height, unsigned char* pixel
 
 }  // namespace
 
-extern "C" int stippleOiioRead(const char* path, int* width, int* height, unsigned char* pixels, char* error,
-                               int errorBytes) {
+extern "C" int stippleOiioRead(const char* path, const void* bytes, unsigned long byteCount, int* width, int* height,
+                               unsigned char* pixels, char* error, int errorBytes) {
     try {
         OIIO::ImageSpec config;
         config.attribute("oiio:UnassociatedAlpha", 1);
-        const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open(path, &config);
+        const Opened in(path, bytes, byteCount, config);
+        if (!in.get()) return report(in.problem(), error, errorBytes);
         return readRgba(in.get(), width, height, pixels, error, errorBytes);
     } catch (const std::bad_alloc&) {
         return kStippleOiioNoMemory;
@@ -131,11 +157,12 @@ extern "C" int stippleOiioDecode(const char* format, const void* bytes, unsigned
     }
 }
 
-extern "C" int stippleOiioReadFloat(const char* path, int* width, int* height, float* pixels, char* error,
-                                    int errorBytes) {
+extern "C" int stippleOiioReadFloat(const char* path, const void* bytes, unsigned long byteCount, int* width,
+                                    int* height, float* pixels, char* error, int errorBytes) {
     try {
-        const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open(path);
-        if (!in) return report(OIIO::geterror(), error, errorBytes);
+        const Opened opened(path, bytes, byteCount, {});
+        OIIO::ImageInput* const in = opened.get();
+        if (!in) return report(opened.problem(), error, errorBytes);
         const OIIO::ImageSpec& spec = in->spec();
         if (!tellSize(spec, pixels != nullptr, width, height)) return report(kChanged, error, errorBytes);
         if (!pixels) return 0;

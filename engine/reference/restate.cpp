@@ -370,7 +370,9 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         executor_.parallelFor(pixels, 4096, [&](size_t begin, size_t end) {
             for (size_t i = begin; i < end; ++i) {
                 const Sample& s = level.samples[i];
-                Seen seen{dvec3(f.background), dvec3(0), 0};
+                const dvec2 middle(double(i % v.width) + 0.5, double(i / v.width) + 0.5);
+                const dvec3 behind = behindAll(draws, middle);
+                Seen seen{behind, dvec3(0), 0};
                 if (s.valid) {
                     seen = seenOf(draws, own.samples[i], s, i);
                     const auto second = level.seconds.find(i);
@@ -383,8 +385,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                             f.debugView == shared::kDebugHoles || f.debugView == shared::kDebugNormals;
                         if (!isOfGeometry) seen.colour = mixed;
                     }
-                    seen.colour = applyOnSent(draws, seen.colour,
-                                              {double(i % v.width) + 0.5, double(i / v.width) + 0.5}, seen.depth);
+                    seen.colour = applyOnSent(draws, seen.colour, middle, seen.depth);
                     // Of a pixel that is less than half covered the ray meets nothing.
                     if (wantAll && s.coverage >= 0.5) {
                         image.depth[i] = static_cast<float>(seen.depth);
@@ -394,7 +395,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                     }
                 }
                 const double share = s.coverage * s.opacity;
-                const dvec3 colour = glm::mix(dvec3(f.background), seen.colour, share);
+                const dvec3 colour = glm::mix(behind, seen.colour, share);
                 if (wantAll)
                     for (int c = 0; c < 3; ++c)
                         image.linear[i * 3 + static_cast<size_t>(c)] = static_cast<float>(colour[c]);

@@ -13,6 +13,7 @@
 #include "engine/reference/decode_patch.h"
 #include "engine/reference/reference.h"
 #include "engine/reference/surface.h"
+#include "engine/reference/surroundings.h"
 #include "engine/render/effects/table.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/store/colour.h"
@@ -488,6 +489,12 @@ class Tracer {
     render::DrawList draws_;
 };
 
+/// What of a backdrop a ray brings that meets nothing; `n`: rays along an edge of a pixel.
+dvec3 missedLight(const render::DrawSettings& draw, const lod::View& view, const ViewRay& ray, uint32_t n) {
+    const dvec3 world = view.right * ray.direction.x + view.down * ray.direction.y + view.forward * ray.direction.z;
+    return lightFrom(*draw.backdrop, toMap(world, draw.worldUp), view.isOrthographic ? 0 : 1 / (view.focalPixels * n));
+}
+
 }  // namespace
 
 Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, const lod::View& view,
@@ -502,6 +509,7 @@ Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, cons
     image.normal.resize(image.rgba.size() * 3);
     image.linear.resize(image.rgba.size() * 3);
     const uint32_t n = std::max(1u, settings.samplesPerAxis);
+    const bool hasBackdrop = render::showsBackdrop(settings.draw);
     executor.parallelFor(view.height, 4, [&](size_t row0, size_t row1) {
         for (size_t y = row0; y < row1; ++y)
             for (uint32_t x = 0; x < view.width && !isStopRequested(); ++x) {
@@ -511,17 +519,17 @@ Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, cons
                 double depth = 0;
                 for (uint32_t s = 0; s < n * n; ++s) {
                     dvec3 colour(0);
-                    if (!tracer.look(rayAt(x + (s % n + 0.5) / n, double(y) + (s / n + 0.5) / n),
-                                     1 / (view.focalPixels * n), colour))
-                        continue;
-                    ++hits;
-                    sum += colour;
+                    const ViewRay ray = rayAt(x + (s % n + 0.5) / n, double(y) + (s / n + 0.5) / n);
+                    const bool isHit = tracer.look(ray, 1 / (view.focalPixels * n), colour);
+                    hits += isHit ? 1 : 0;
+                    if (isHit || hasBackdrop) sum += isHit ? colour : missedLight(settings.draw, view, ray, n);
                 }
                 // Of edges a mean would be the depth of nothing.
                 const bool isThere =
                     tracer.surface(rayAt(x + 0.5, double(y) + 0.5), 1 / view.focalPixels, depth, normal);
                 const double coverage = double(hits) / (n * n);
-                const dvec3 c = sum / double(n * n) + (1 - coverage) * dvec3(settings.draw.background);
+                const dvec3 beside = hasBackdrop ? dvec3(0) : (1 - coverage) * dvec3(settings.draw.background);
+                const dvec3 c = sum / double(n * n) + beside;
                 const size_t pixel = y * view.width + x;
                 image.depth[pixel] = isThere ? static_cast<float>(depth) : 0.0f;
                 for (int k = 0; k < 3; ++k) {

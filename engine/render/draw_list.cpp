@@ -1,6 +1,7 @@
 #include "engine/render/draw_list.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/base/check.h"
@@ -24,6 +25,8 @@ static_assert(sizeof(shared::DrawMesh) == 120);
 static_assert(sizeof(shared::SurfaceMaterial) == 192);
 
 namespace {
+
+constexpr size_t kMostEffects = 8 * sizeof(EffectSet::bits);
 
 /// Nearer than this nothing of the cut can be: by the nearest bounding sphere; of a node that holds the eye, a step of
 /// its lattice, nearer than which nothing of it can be told apart. (Depth is linear: a small distance costs nothing.)
@@ -86,6 +89,7 @@ void clear(DrawList& out) {
     out.meshDraws.clear();
     out.lights.clear();
     out.environment.reset();
+    out.backdrop.reset();
     out.tables.clear();
     out.layer = nullptr;
     out.glass.reset();
@@ -165,9 +169,11 @@ void drawsSamples(lod::CutDraw& draw) {
 /// Counts the nodes that feed each of the effects, which may move them.
 void addNodes(const glm::dmat3& cameraFromWorld, const DrawSettings& settings, EffectSet requested,
               std::span<uint64_t> fed, DrawList& out) {
-    std::vector<size_t> asked;  // mostly none
+    std::array<size_t, kMostEffects> places{};
+    size_t count = 0;  // mostly none
     for (size_t e = 0; e < effects().size(); ++e)
-        if (requested.has(e) && effects()[e]->ofNode != nullptr) asked.push_back(e);
+        if (requested.has(e) && effects()[e]->ofNode != nullptr) places.at(count++) = e;
+    const std::span<const size_t> asked(places.data(), count);
     for (lod::CutDraw& draw : out.cut) {
         const lod::Instance& instance = out.instances[draw.instance];
         const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
@@ -291,7 +297,7 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.frame.hasMaterials = 0;
     const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
     const EffectSet requested = requestedEffects(out.effectsOfScene, settings);
-    std::vector<uint64_t> fed(effects().size());
+    std::array<uint64_t, kMostEffects> fed{};
     addNodes(cameraFromWorld, settings, requested, fed, out);
     forEachKind([&](lod::Kind kind) {
         if (drawnKind(kind).add != nullptr) drawnKind(kind).add(cut, cameraFromWorld, out);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/render/backdrop.h"
 #include "engine/render/content.h"
 #include "engine/render/effects/settings.h"
 #include "engine/render/effects/table.h"
@@ -97,6 +98,7 @@ struct DrawList {
     std::vector<MeshDraw> meshDraws;  ///< runs of clusters: what blocks and keys of the batch of triangles belong to
     std::vector<shared::LightSource> lights;
     std::shared_ptr<const Environment> environment;  ///< null: a sky without features
+    std::shared_ptr<const Backdrop> backdrop;        ///< behind everything; null: one colour
     uint64_t swaying = 0;                            ///< nodes that effects move
     uint32_t firstSource = 0;                        ///< what the backend calls source 0; set before the list is made
     EffectSet effectsOfScene = allEffects();         ///< what it could show; set before the list is made
@@ -160,6 +162,7 @@ struct DrawSettings {
     glm::vec3 background = linearBackground();  ///< linear
     glm::dvec3 worldUp{0, 0, 1};
     std::shared_ptr<const Environment> environment;
+    std::shared_ptr<const Backdrop> backdrop;   ///< behind everything instead of `background`
     std::vector<WorldLight> lights;             ///< none: a sun over the viewer's shoulder
     std::shared_ptr<const ShadowMaps> shadows;  ///< set by the frame, of the lights that cast (shadow_frame.h)
     float supportScale = 1.0f;                  ///< splat radius of the reconstruction / stored radius

@@ -52,6 +52,9 @@ std::vector<EffectStatus> effectStatus(const FrameState& state, const DrawSettin
         s.isRequested = state.effects.requested.has(e);
         s.calledForBy = requesterOf(effect, settings);
         s.isActive = state.effects.shown.has(e);
+        // (Of a frame of layers some are: the settings of the whole do not ask for them.)
+        if (s.isActive && s.calledForBy.empty())
+            s.calledForBy = effect.option != nullptr ? effect.option : "the program";
         if (e < state.effects.passes.size()) s.passes = state.effects.passes[e];
         if (e < held.effects.size()) s.held = held.effects[e];
         if (effect.before != nullptr) s.held.bytes += effect.before->bytes(state);

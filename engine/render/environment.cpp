@@ -4,13 +4,12 @@
 #include <array>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <numbers>
 
 #include "shaders/shared/environment.h"
 
 namespace stipple::render {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 struct Sample {
     glm::vec3 direction, light;  ///< light times solid angle
@@ -18,7 +17,7 @@ struct Sample {
 };
 
 glm::dvec3 directionOf(double u, double v) {
-    const double azimuth = (u - 0.5) * 2 * kPi, elevation = (0.5 - v) * kPi;
+    const double azimuth = (u - 0.5) * 2 * std::numbers::pi, elevation = (0.5 - v) * std::numbers::pi;
     return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), -std::cos(azimuth) * std::cos(elevation)};
 }
 
@@ -35,9 +34,9 @@ std::vector<Sample> reduce(const HdrImage& image, float scale, uint32_t width, u
                     const float* c = &image.rgb[(size_t{j} * image.width + i) * 3];
                     for (int k = 0; k < 3; ++k) sum[k] += std::isfinite(c[k]) ? std::clamp(c[k], 0.0f, 6e4f) : 0;
                 }
-            const double top = std::sin((0.5 - double(y) / height) * kPi),
-                         bottom = std::sin((0.5 - double(y + 1) / height) * kPi);
-            const double angle = (top - bottom) * 2 * kPi / width;
+            const double top = std::sin((0.5 - double(y) / height) * std::numbers::pi),
+                         bottom = std::sin((0.5 - double(y + 1) / height) * std::numbers::pi);
+            const double angle = (top - bottom) * 2 * std::numbers::pi / width;
             const glm::dvec3 light = sum * (scale * angle / (double(x1 - x0) * (y1 - y0)));
             out.push_back({glm::vec3(directionOf((x + 0.5) / width, (y + 0.5) / height)), glm::vec3(light),
                            static_cast<float>(angle)});
@@ -47,8 +46,9 @@ std::vector<Sample> reduce(const HdrImage& image, float scale, uint32_t width, u
 
 void addHarmonics(const std::vector<Sample>& samples, std::vector<float>& table) {
     // Basis constants squared, times the cosine's factors over pi: 1, 2/3, 1/4.
-    const double c0 = 1 / (4 * kPi), c1 = 3 / (4 * kPi) * (2.0 / 3), c2 = 15 / (4 * kPi) * 0.25,
-                 c20 = 5 / (16 * kPi) * 0.25, c22 = 15 / (16 * kPi) * 0.25;
+    const double c0 = 1 / (4 * std::numbers::pi), c1 = 3 / (4 * std::numbers::pi) * (2.0 / 3),
+                 c2 = 15 / (4 * std::numbers::pi) * 0.25, c20 = 5 / (16 * std::numbers::pi) * 0.25,
+                 c22 = 15 / (16 * std::numbers::pi) * 0.25;
     std::array<glm::dvec3, 9> sum{};
     for (const Sample& s : samples) {
         const glm::dvec3 l(s.light), d(s.direction);
@@ -80,8 +80,8 @@ glm::vec3 directionOfTexel(uint32_t x, uint32_t y, uint32_t edgeTexels) {
 }
 
 glm::vec3 plainLook(const HdrImage& image, const glm::vec3& d) {
-    const double u = 0.5 + std::atan2(double(d.x), -double(d.z)) / (2 * kPi),
-                 v = 0.5 - std::asin(std::clamp(double(d.y), -1.0, 1.0)) / kPi;
+    const double u = 0.5 + std::atan2(double(d.x), -double(d.z)) / (2 * std::numbers::pi),
+                 v = 0.5 - std::asin(std::clamp(double(d.y), -1.0, 1.0)) / std::numbers::pi;
     const double px = u * image.width - 0.5, py = std::clamp(v * image.height - 0.5, 0.0, image.height - 1.0);
     const double left = std::floor(px), top = std::floor(py);
     const auto x0 = static_cast<uint32_t>((static_cast<int64_t>(left) + image.width) % image.width),
@@ -129,6 +129,13 @@ void addSharpMaps(const HdrImage& image, float scale, Executor& executor, Enviro
 
 }  // namespace
 
+glm::dmat3 environmentAxes(const glm::dvec3& worldUp) {
+    const glm::dvec3 up = glm::normalize(worldUp);
+    const glm::dvec3 aside = std::abs(up.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+    const glm::dvec3 back = glm::normalize(glm::cross(aside, up));
+    return {glm::cross(up, back), up, back};
+}
+
 Environment makeEnvironment(const HdrImage& image, float scale, Executor& executor, bool hasMirrors) {
     Environment out;
     const std::vector<Sample> fine = reduce(image, scale, 256, 128), coarse = reduce(image, scale, 64, 32);
@@ -145,8 +152,8 @@ Environment makeEnvironment(const HdrImage& image, float scale, Executor& execut
                     glm::vec3 sum(0);
                     float weights = 0;
                     if (kDoublings.at(l) < 0) {  // a plain look
-                        const double u = 0.5 + std::atan2(double(d.x), -double(d.z)) / (2 * kPi),
-                                     v = 0.5 - std::asin(std::clamp(double(d.y), -1.0, 1.0)) / kPi;
+                        const double u = 0.5 + std::atan2(double(d.x), -double(d.z)) / (2 * std::numbers::pi),
+                                     v = 0.5 - std::asin(std::clamp(double(d.y), -1.0, 1.0)) / std::numbers::pi;
                         const auto px = std::min(static_cast<uint32_t>(u * 256), 255u),
                                    py = std::min(static_cast<uint32_t>(v * 128), 127u);
                         const Sample& s = fine[size_t{py} * 256 + px];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,10 @@ struct HdrImage {
     uint32_t width = 0, height = 0;
     std::vector<float> rgb;
 };
+
+/// The picture's axes in the world: its y is up, its x the world's (where that is up: the world's z) without its part
+/// along up.
+glm::dmat3 environmentAxes(const glm::dvec3& worldUp);
 
 struct Environment {
     std::vector<float> table;  ///< kEnvironmentFloats, and the sharp maps where there are any

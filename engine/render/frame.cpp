@@ -262,7 +262,7 @@ Result<uint64_t> drawMetered(FrameState& state, const lod::View& view, const Fra
     plain.staysOnDevice = false;
     takeTone(plain.draw);
     STIPPLE_ASSIGN(const uint64_t passes, drawPlain(state, view, plain));
-    toneImage(settings.draw, state.image);
+    toneImage(settings.draw, view, state.image);
     if (!settings.wantDepthAndNormal) {
         state.image.depth.clear();
         state.image.normal.clear();

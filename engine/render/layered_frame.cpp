@@ -69,6 +69,7 @@ FrameSettings settingsFromBehind(const FrameSettings& settings) {
     s.draw.lit = false;
     s.draw.unlitTriangles = true;
     s.draw.environment.reset();
+    s.draw.backdrop.reset();
     s.draw.lights.clear();
     s.draw.effects.clear();
     return s;
@@ -172,7 +173,7 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
         putLayer(state.image, settings.draw.background, layer.opacity, l.behind);
     }
     std::swap(state.image, l.behind);
-    if (hasTone) toneImage(settings.draw, state.image);
+    if (hasTone) toneImage(settings.draw, view, state.image);
     if (!settings.wantDepthAndNormal) {
         state.image.depth.clear();
         state.image.normal.clear();

@@ -3,6 +3,7 @@
 // (effects/tone.cpp).
 #pragma once
 
+#include "engine/render/backdrop.h"
 #include "engine/render/backend.h"
 #include "engine/render/draw_list.h"
 
@@ -16,10 +17,11 @@ bool takeTone(DrawSettings& settings);
 
 /// The factor that takes what is covered of a picture to middle grey (0.18) in the mean of the logarithms of its
 /// luminance, between 2^-20 and 2^20; 1 where nothing is covered. Luminance below 2^-20 counts as so much.
-/// `background`: linear, part of pixels that are covered in part.
-double meteredExposure(const Image& image, const glm::vec3& background);
+/// `behind`: part of pixels that are covered in part.
+double meteredExposure(const Image& image, const Behind& behind);
 
-/// Tone as `settings` ask for it, on what of the picture is covered; the picture has its linear colours.
-void toneImage(const DrawSettings& settings, Image& image);
+/// Tone as `settings` ask for it, on what of the picture is covered, and on an environment's picture behind it; the
+/// picture has its linear colours. `view`: what it shows.
+void toneImage(const DrawSettings& settings, const lod::View& view, Image& image);
 
 }  // namespace stipple::render

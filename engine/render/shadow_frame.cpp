@@ -29,6 +29,7 @@ FrameSettings settingsOfCasters(const FrameSettings& settings) {
     s.draw.lit = false;
     s.draw.unlitTriangles = true;
     s.draw.environment.reset();
+    s.draw.backdrop.reset();
     s.draw.lights.clear();
     s.draw.shadows.reset();
     s.draw.effects.clear();

@@ -1,11 +1,10 @@
 #include "engine/render/wind.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace stipple::render {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// In [-1, 1]. Taller plants swing more slowly; gusts are kGust metres apart and travel with the wind.
 double gust(const Wind& wind, const glm::dvec3& foot, double height) {
@@ -13,7 +12,7 @@ double gust(const Wind& wind, const glm::dvec3& foot, double height) {
     const double frequency = 0.9 / std::sqrt(std::max(height, 0.1));
     const double phase = glm::dot(wind.towards, foot) / kGust;
     // Turns are taken off in fp64, so that the motion is as smooth after a day as at once (hard case 54).
-    const auto wave = [&](double turns) { return std::sin(2 * kPi * (turns - std::floor(turns))); };
+    const auto wave = [&](double turns) { return std::sin(2 * std::numbers::pi * (turns - std::floor(turns))); };
     return 0.7 * wave(frequency * wind.seconds - phase) + 0.3 * wave(2.3 * frequency * wind.seconds - 1.7 * phase);
 }
 

@@ -14,15 +14,15 @@
 
 #include "engine/base/file.h"
 #include "engine/scene/obj_polygons.h"
-#include "engine/scene/scene.h"
+#include "engine/scene/scene_bytes.h"
 
 namespace stipple::scene {
 namespace {
 
-/// A file as a stream, in blocks: what is read is a regular file, and no more than what it held when it was opened.
+/// Bytes as a stream, in blocks; of a file no more than what it held when it was opened.
 class FileStream final : public std::streambuf {
   public:
-    explicit FileStream(const InputFile& file) : file_(file), block_(size_t{1} << 20) {}
+    explicit FileStream(const ByteSource& file) : file_(file), block_(size_t{1} << 20) {}
     /// What went wrong: a stream only ends.
     const Result<void>& result() const { return result_; }
 
@@ -40,7 +40,7 @@ class FileStream final : public std::streambuf {
     }
 
   private:
-    const InputFile& file_;
+    const ByteSource& file_;
     std::vector<char> block_;
     uint64_t at_ = 0;
     Result<void> result_;
@@ -49,8 +49,9 @@ class FileStream final : public std::streambuf {
 /// Materials of MTL files beside the OBJ file. (The library's own reader opens whatever it is told to.)
 class MaterialFiles final : public tinyobj::MaterialReader {
   public:
-    MaterialFiles(std::string folder, const ReadSettings& settings, std::vector<std::string>& notes)
-        : folder_(std::move(folder)), settings_(settings), notes_(notes) {}
+    MaterialFiles(std::string folder, const ReadSettings& settings, const Resolve& resolve,
+                  std::vector<std::string>& notes)
+        : folder_(std::move(folder)), settings_(settings), resolve_(resolve), notes_(notes) {}
 
     bool operator()(const std::string& name, std::vector<tinyobj::material_t>* materials,
                     std::map<std::string, int>* byName, std::string* warning, std::string* error) override {
@@ -58,7 +59,7 @@ class MaterialFiles final : public tinyobj::MaterialReader {
             notes_.push_back(fmt::format("materials are left out: {}", why));
             return true;
         };
-        const auto bytes = readFileOfScene(folder_, withSlashes(name), settings_);
+        const auto bytes = readNamed(resolve_, folder_, withSlashes(name), settings_);
         if (!bytes) return leaveOut(bytes.error().line());
         const std::string text(bytes->begin(), bytes->end());
         uint64_t count = 1;
@@ -74,16 +75,17 @@ class MaterialFiles final : public tinyobj::MaterialReader {
   private:
     std::string folder_;
     const ReadSettings& settings_;
+    const Resolve& resolve_;
     std::vector<std::string>& notes_;
 };
 
 /// An image beside the file; missing ones are noted and count as white.
-int addImage(const std::string& folder, std::string name, const ReadSettings& settings, Scene& scene,
-             std::map<std::string, int>& known) {
+int addImage(const std::string& folder, std::string name, const ReadSettings& settings, const Resolve& resolve,
+             Scene& scene, std::map<std::string, int>& known) {
     if (name.empty()) return -1;
     name = withSlashes(name);
     if (const auto found = known.find(name); found != known.end()) return found->second;
-    auto bytes = readFileOfScene(folder, name, settings);
+    auto bytes = readNamed(resolve, folder, name, settings);
     if (!bytes || bytes->empty()) {
         scene.notes.push_back(
             fmt::format("texture '{}' is left out: {}", name, bytes ? "is empty" : bytes.error().line()));
@@ -140,14 +142,14 @@ std::string plainReason(const std::string& error) {
     return fmt::format("is not a readable OBJ: line {} is not what OBJ expects", error.substr(digits, end - digits));
 }
 
-Result<Parsed> parse(const std::string& path, const std::string& folder, const ReadSettings& settings,
-                     std::vector<std::string>& notes) {
-    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+Result<Parsed> parse(const ByteSource& file, const std::string& folder, const ReadSettings& settings,
+                     const Resolve& resolve, std::vector<std::string>& notes) {
+    const std::string& path = file.path();
     FileStream buffer(file);
     SplitFaces split(buffer);
     STIPPLE_ASSIGN(const bool isLarge, hasLargeFaces(file));
     std::istream in(isLarge ? static_cast<std::streambuf*>(&split) : &buffer);
-    MaterialFiles materials(folder, settings, notes);
+    MaterialFiles materials(folder, settings, resolve, notes);
     Parsed out;
     std::string error;
     try {
@@ -166,13 +168,19 @@ Result<Parsed> parse(const std::string& path, const std::string& folder, const R
 }  // namespace
 
 Result<Scene> readObj(const std::string& path, const ReadSettings& settings) {
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    return readObj(file, settings, {});
+}
+
+Result<Scene> readObj(const ByteSource& file, const ReadSettings& settings, const Resolve& resolve) {
+    const std::string& path = file.path();
     Scene scene;
     scene.path = path;
     const std::string folder = std::filesystem::path(path).parent_path().string();
-    STIPPLE_ASSIGN(const Parsed parsed, parse(path, folder, settings, scene.notes));
+    STIPPLE_ASSIGN(const Parsed parsed, parse(file, folder, settings, resolve, scene.notes));
     std::map<std::string, int> images;
     for (const tinyobj::material_t& m : parsed.materials)
-        scene.materials.push_back(materialOf(m, addImage(folder, m.diffuse_texname, settings, scene, images)));
+        scene.materials.push_back(materialOf(m, addImage(folder, m.diffuse_texname, settings, resolve, scene, images)));
     const tinyobj::attrib_t& a = parsed.attributes;
     const auto positions = static_cast<int>(a.vertices.size() / 3), normals = static_cast<int>(a.normals.size() / 3),
                uvs = static_cast<int>(a.texcoords.size() / 2);

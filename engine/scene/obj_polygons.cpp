@@ -43,7 +43,7 @@ Number numberOf(std::string_view word, Number otherwise) {
 
 }  // namespace
 
-Result<bool> hasLargeFaces(const InputFile& file) {
+Result<bool> hasLargeFaces(const ByteSource& file) {
     std::string block(size_t{1} << 20, '\0'), line;  // the line that a block ends in
     for (uint64_t at = 0; at < file.sizeBytes();) {
         const size_t count = static_cast<size_t>(std::min<uint64_t>(block.size(), file.sizeBytes() - at));

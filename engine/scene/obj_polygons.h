@@ -9,12 +9,12 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/base/file.h"
+#include "engine/base/byte_source.h"
 
 namespace stipple::scene {
 
 /// Is there one? (Looks at the lengths of lines, at the speed of memory.)
-Result<bool> hasLargeFaces(const InputFile& file);
+Result<bool> hasLargeFaces(const ByteSource& file);
 
 /// The text of an OBJ file with triangles instead of its large faces.
 class SplitFaces final : public std::streambuf {

@@ -1,14 +1,38 @@
-#include "engine/scene/scene.h"
+#include "engine/scene/scene_bytes.h"
 
 #include <filesystem>
 
-#include "lod/store/file_kind.h"
+#include "engine/base/file.h"
 
 namespace stipple::scene {
 
 Result<Scene> readScene(const std::string& path, const ReadSettings& settings) {
-    const bool isObj = std::filesystem::path(path).extension() == ".obj" && lod::fileKindOf(path) != lod::FileKind::glb;
-    return isObj ? readObj(path, settings) : readGltf(path, settings);
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    return readScene(file, settings, {});
+}
+
+Result<Scene> readScene(const ByteSource& file, const ReadSettings& settings, const Resolve& resolve) {
+    const bool isObj =
+        std::filesystem::path(file.path()).extension() == ".obj" && lod::fileKindOf(file) != lod::FileKind::glb;
+    return isObj ? readObj(file, settings, resolve) : readGltf(file, settings, resolve);
+}
+
+bool isScene(const std::string& path, lod::FileKind kind) {
+    if (kind != lod::FileKind::other) return kind == lod::FileKind::glb;
+    const std::string extension = std::filesystem::path(path).extension().string();
+    return extension == ".gltf" || extension == ".glb" || extension == ".obj";
+}
+
+Result<std::vector<uint8_t>> readNamed(const Resolve& resolve, const std::string& folder, const std::string& name,
+                                       const ReadSettings& settings) {
+    if (!resolve) return readFileOfScene(folder, name, settings);
+    STIPPLE_ASSIGN(const std::shared_ptr<const ByteSource> source, resolve(name));
+    if (!source) return fail(ErrorKind::input, "is not among what was given with the scene", name);
+    if (source->sizeBytes() > settings.memoryBytes)
+        return overBudget("is read as a whole, which", source->sizeBytes(), settings.memoryBytes, source->path());
+    std::vector<uint8_t> bytes(source->sizeBytes());
+    if (!bytes.empty()) STIPPLE_TRY(source->readAt(0, bytes.data(), bytes.size()));
+    return bytes;
 }
 
 std::vector<glm::dmat4> Scene::worldTransforms() const {

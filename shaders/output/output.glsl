@@ -21,6 +21,13 @@ layout(set = 0, binding = kToneBinding, scalar) uniform ToneBlock { ToneConstant
 #endif
 layout(local_size_x = 64) in;
 
+// What is behind everything at a pixel (../background).
+vec3 behindAll(uint at) {
+    if (stepInfo.hasBackground == 0u) return frame.background;
+    const uint plane = frame.width * frame.height;
+    return vec3(uintBitsToFloat(texels[at]), uintBitsToFloat(texels[at + plane]), uintBitsToFloat(texels[at + 2u * plane]));
+}
+
 // From what a surface sends to what arrives, and to what a screen is sent.
 vec3 arriving(vec3 colour, float depth, uvec2 pixel) {
 #ifdef FOG
@@ -58,7 +65,7 @@ void main() {
     const uint at = pixel.y * frame.width + pixel.x;
     SurfaceWords s = surfaceBuffer[at];
     const bool valid = s.depth > 0.0;
-    vec3 colour = frame.background;
+    vec3 colour = vec3(0.0);
     vec3 n = vec3(0.0);
     if (valid) {
         n = octDecode(s.normal);
@@ -78,7 +85,12 @@ void main() {
     // What rays meet: of a pixel that is hardly covered nothing. (What it shows through does not matter.)
     const bool isMet = valid && share >= kLeastShown;
     share *= wordOpacity(s.material);
-    if (valid && (share < 1.0 || stepInfo.hasFiltered != 0u)) colour = frame.background + share * (colour - frame.background);
+    if (!valid) {
+        colour = behindAll(at);
+    } else if (share < 1.0 || stepInfo.hasFiltered != 0u) {
+        const vec3 behind = behindAll(at);
+        colour = behind + share * (colour - behind);
+    }
     const vec3 c = clamp(colour, 0.0, 1.0);
     const uvec3 bytes = uvec3(vec3(srgbFromLinear(c.x), srgbFromLinear(c.y), srgbFromLinear(c.z)) * 255.0 + 0.5);
     image[at] = bytes.x | bytes.y << 8 | bytes.z << 16 | uint(share * 255.0 + 0.5) << 24;

@@ -40,7 +40,9 @@ const uint kToneBinding = 32u;
 const uint kOcclusionBinding = 33u;
 const uint kOpenBinding = 34u;
 const uint kShadowBinding = 35u;
-const uint kBindings = 36u;
+const uint kBackgroundBinding = 36u;
+const uint kBackdropBinding = 37u;
+const uint kBindings = 38u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more
@@ -74,19 +76,20 @@ struct Step {
     uint coarse;
     uint coarseWidth;
     uint coarseHeight;
-    uint level;         // of the fine side
-    uint wantExtra;     // write depth, normals and linear colour
-    uint hasPyramid;    // levels above the first are of this frame
-    uint hasTubes;      // texels may be of tubes
-    uint hasTriangles;  // pixels may be of triangles or patches
-    uint hasWideDiscs;  // there is a list of them
-    uint exactPoints;   // points are what their pixels show, at the depth of the visibility buffer
-    uint hasFiltered;   // ... of what discs were blended to
-    uint onlySmooth;    // of the nodes of points, those that are kNodeSmooth
-    uint hasSmooth;     // pixels of wide discs take colours and normals from a pyramid of their own ...
-    uint smoothTexels;  // ... whose level 0 has its planes here
-    uint count;         // of clusters or blocks
-    uint firstBlock;    // of the ids that are drawn
+    uint level;          // of the fine side
+    uint wantExtra;      // write depth, normals and linear colour
+    uint hasPyramid;     // levels above the first are of this frame
+    uint hasTubes;       // texels may be of tubes
+    uint hasTriangles;   // pixels may be of triangles or patches
+    uint hasWideDiscs;   // there is a list of them
+    uint exactPoints;    // points are what their pixels show, at the depth of the visibility buffer
+    uint hasFiltered;    // ... of what discs were blended to
+    uint onlySmooth;     // of the nodes of points, those that are kNodeSmooth
+    uint hasBackground;  // what is not covered shows what pass background has left, else frame.background
+    uint hasSmooth;      // pixels of wide discs take colours and normals from a pyramid of their own ...
+    uint smoothTexels;   // ... whose level 0 has its planes here
+    uint count;          // of clusters or blocks
+    uint firstBlock;     // of the ids that are drawn
 };
 
 SHARED_END

@@ -31,5 +31,38 @@ shot shadow-on forest.glb $wood --sun 135,35
 shot shadow-soft forest.glb $wood --sun 135,35 --sun-size 3
 shot occlusion-off house.glb
 shot occlusion-on house.glb --effects occlusion
+[ -f dusk.hdr ] || python3 - dusk.hdr <<'END' || exit 1
+# A sky with a low sun, hills and a ground, 1024 x 512: Radiance's four bytes a texel, plain.
+import math, sys
+def texel(x, y, w, h):
+    a, e = (x + 0.5) / w * 2 * math.pi, math.pi * (0.5 - (y + 0.5) / h)
+    d = (math.cos(e) * math.sin(a), math.sin(e), -math.cos(e) * math.cos(a))
+    hill = 0.09 + 0.035 * math.sin(5 * a) + 0.02 * math.sin(13 * a + 1) + 0.008 * math.sin(41 * a)
+    if e < 0: return (0.10 + 0.05 * e, 0.09 + 0.045 * e, 0.07 + 0.035 * e)
+    if e < hill: return (0.05, 0.06, 0.07)
+    sun = (0.5, 0.3, -0.81)
+    c = sum(p * q for p, q in zip(d, sun))
+    glow = max(c, 0) ** 32
+    if c > math.cos(0.02): return (90, 70, 40)
+    t = max(0.0, min(1.0, e / 1.2))
+    return (0.75 - 0.6 * t + 0.9 * glow, 0.55 - 0.3 * t + 0.5 * glow, 0.5 + 0.15 * t + 0.15 * glow)
+def rgbe(c):
+    m = max(c)
+    if m < 1e-32: return bytes(4)
+    f, e = math.frexp(m)
+    return bytes([min(255, int(v / m * f * 256)) for v in c] + [e + 128])
+w, h = 1024, 512
+with open(sys.argv[1], "wb") as out:
+    out.write(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % (h, w))
+    for y in range(h):
+        out.write(b"".join(rgbe(texel(x, y, w, h)) for x in range(w)))
+END
+[ -f balls/demo.glb ] || "$program" grow demo -o balls --points 100k --leaves 20k >/dev/null || exit 1
+shot background-off house.glb --environment dusk.hdr
+shot background-on house.glb --environment dusk.hdr --background environment
+shot background-wide scan.las --up z --mode ewa --shade lit --environment dusk.hdr --background environment --fov 90
+balls="--eye 0,4,40 --target 0,3.2,24 --environment dusk.hdr --effects none"
+shot background-glass-off balls/demo.glb $balls
+shot background-glass balls/demo.glb $balls --background environment
 shot opacity-scan scan.las --up z --opacity 0.5
 shot opacity-house house.glb --opacity 0.4

@@ -8,6 +8,7 @@
 #include <new>
 
 #include "engine/cpu/cpu_backend.h"
+#include "engine/render/draw_list.h"
 #include "engine/scene/camera.h"
 #include "lod/cut/frame.h"
 #include "tests/support/forests.h"
@@ -126,8 +127,9 @@ TEST(CutMemory, NothingIsAllocatedOnceWarmWithInstanceGroups) {
     EXPECT_GT(laps.mixed, 40u);
 }
 
-/// What the thread of frames allocates up to the request, of a camera that flies round a ball of points `laps` times;
-/// memory holds a part of what it sees. Tasks that read and decode are other threads', or run between frames.
+/// What the thread of frames allocates up to the list of what is drawn, of a camera that flies round a ball of points
+/// `laps` times; memory holds a part of what it sees. Tasks that read and decode are other threads', or run between
+/// frames.
 struct Flight {
     std::vector<uint64_t> allocated, uploads, evictions;  ///< of each lap
 };
@@ -152,6 +154,7 @@ Flight flyStreamed(Executor& executor, const std::shared_ptr<const lod::Store>& 
                 streamer.upload();
                 lod::selectCut(state->scene(), streamer.residency(), view, {1, kNoLimit}, state->scratch, state->cut);
                 streamer.request(state->cut);
+                render::makeDrawList(state->cut, state->hierarchies, state->instances, view, {}, state->draws);
                 allocated += ownAllocations - start;
                 streamer.wait();
             }

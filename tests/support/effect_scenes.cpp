@@ -44,6 +44,17 @@ std::shared_ptr<const render::Environment> sky(Executor& executor) {
     return kSky;
 }
 
+/// Darker towards the ground.
+std::shared_ptr<const render::Backdrop> dusk(Executor& executor) {
+    static const auto kDusk = [&] {
+        render::HdrImage image{64, 32, {}};
+        for (uint32_t y = 0; y < image.height; ++y)
+            image.rgb.insert(image.rgb.end(), size_t{3} * image.width, 0.5f - 0.01f * static_cast<float>(y));
+        return std::make_shared<const render::Backdrop>(render::makeBackdrop(std::move(image), 1, executor));
+    }();
+    return kDusk;
+}
+
 /// A sun over the viewer's left shoulder.
 render::WorldLight lampThatCasts() {
     render::WorldLight light;
@@ -61,6 +72,8 @@ void addEffect(const std::string& name, Executor& executor, render::DrawSettings
     } else if (name == "environment") {
         s.unlitTriangles = false;
         s.environment = sky(executor);
+    } else if (name == "background") {
+        s.backdrop = dusk(executor);
     } else if (name == "wind") {
         s.wind = {0.3, 1.5, {1, 0, 0}};
     } else {
@@ -76,7 +89,14 @@ void addEffect(const std::string& name, Executor& executor, render::DrawSettings
     if (name == "tone") s.parameters.tone = {1.5, 1};
 }
 
-bool addUselessly(const std::string& name, render::DrawSettings& s) {
+bool isOfNothing(const std::string& name) { return name == "background"; }
+
+bool addUselessly(const std::string& name, Executor& executor, render::DrawSettings& s) {
+    if (name == "background") {
+        s.backdrop = dusk(executor);
+        s.debugView = shared::kDebugLevel;
+        return true;
+    }
     if (name == "light") {
         s.unlitTriangles = false;
         s.debugView = shared::kDebugLevel;

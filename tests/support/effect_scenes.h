@@ -19,7 +19,9 @@ lod::View effectView(uint32_t width, uint32_t height, bool away = false);
 /// Asks for the effect, and gives it what it needs to show.
 void addEffect(const std::string& name, Executor& executor, render::DrawSettings& settings);
 /// Asks for it as far as asking goes, where the frame has no use for it. False: such a frame is not known here.
-bool addUselessly(const std::string& name, render::DrawSettings& settings);
+bool addUselessly(const std::string& name, Executor& executor, render::DrawSettings& settings);
+/// Does it show where nothing is in view?
+bool isOfNothing(const std::string& name);
 
 /// Places in the table, of all but glass (whose layers are frames of their own: GlassImages).
 std::vector<size_t> listedEffects();

@@ -45,12 +45,23 @@ Planes readPlanes(const std::string& path) {
     return out;
 }
 
-void writeBytes(const std::string& path, uint32_t width, uint32_t height, const std::vector<uint8_t>& rgba) {
+namespace {
+void write(const std::string& path, uint32_t width, uint32_t height, int channels, OIIO::TypeDesc type,
+           const void* values) {
     const auto out = OIIO::ImageOutput::create(path);
-    OIIO::ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 4, OIIO::TypeDesc::UINT8);
+    OIIO::ImageSpec spec(static_cast<int>(width), static_cast<int>(height), channels, type);
     spec.attribute("oiio:UnassociatedAlpha", 1);
-    if (!out || !out->open(path, spec) || !out->write_image(OIIO::TypeDesc::UINT8, rgba.data()) || !out->close())
+    if (!out || !out->open(path, spec) || !out->write_image(type, values) || !out->close())
         throw std::runtime_error(path + ": " + (out ? out->geterror() : OIIO::geterror()));
+}
+}  // namespace
+
+void writeBytes(const std::string& path, uint32_t width, uint32_t height, const std::vector<uint8_t>& rgba) {
+    write(path, width, height, 4, OIIO::TypeDesc::UINT8, rgba.data());
+}
+
+void writeFloats(const std::string& path, uint32_t width, uint32_t height, const std::vector<float>& rgb) {
+    write(path, width, height, 3, OIIO::TypeDesc::FLOAT, rgb.data());
 }
 
 uint64_t hashPlanes(const Planes& planes) {

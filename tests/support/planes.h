@@ -22,6 +22,8 @@ Planes readPlanes(const std::string& path);
 
 /// Writes RGBA bytes, row by row from the top, in the format of the name's extension (.webp, ...). Throws likewise.
 void writeBytes(const std::string& path, uint32_t width, uint32_t height, const std::vector<uint8_t>& rgba);
+/// The same of RGB floats (.hdr, ...).
+void writeFloats(const std::string& path, uint32_t width, uint32_t height, const std::vector<float>& rgb);
 
 /// Of size, names and the bits of all values.
 uint64_t hashPlanes(const Planes& planes);

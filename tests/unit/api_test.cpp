@@ -109,6 +109,36 @@ TEST_F(Api, SeveralScenesAndRenderersShareADeviceAndEndInAnyOrder) {
     ASSERT_TRUE(second->render(camera, 64, 64));
 }
 
+TEST_F(Api, AnEnvironmentLightsAndIsSeenBehindWhereThatIsAskedFor) {
+    {
+        std::ofstream out(at("even.hdr"), std::ios::binary);
+        out << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n";
+        for (int i = 0; i < 16 * 8; ++i) out << "\x80\x40\x20\x80";  // 1/2, 1/4, 1/8
+    }
+    const stipple::Scene scene = sceneOf("ball.ply");
+    stipple::Renderer r = renderer(device(), scene);
+    stipple::RenderSettings s;
+    s.wantDepthAndNormal = true;
+    s.environment = at("even.hdr");
+    const auto corner = [&] {
+        const auto image = r.render(scene.overview(1), 64, 64, s);
+        EXPECT_TRUE(image) << image.error().line();
+        return std::vector<float>(image->linear.begin(), image->linear.begin() + 3);
+    };
+    EXPECT_LT(corner()[0], 0.1f) << "the control";
+    s.environmentIsBackground = true;
+    const std::vector<float> behind = corner();
+    for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(behind[k], 0.5f / static_cast<float>(1u << k), 1e-3f);
+    s.environmentScale = 3;
+    EXPECT_NEAR(corner()[0], 1.5f, 3e-3f) << "another scale is another picture";
+    s.environment.clear();
+    const auto none = r.render(scene.overview(1), 64, 64, s);
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().kind, ErrorKind::usage);
+    s.environment = at("none.hdr");
+    EXPECT_FALSE(r.render(scene.overview(1), 64, 64, s));
+}
+
 TEST_F(Api, FramesGoOnUntilNothingIsMissing) {
     const stipple::Scene scene = sceneOf("ball.ply");
     stipple::Renderer r = renderer(device(), scene);
@@ -251,6 +281,86 @@ TEST_F(Api, ASourceThatFailsOrBreaksItsWordLeavesNothingBehind) {
     ASSERT_FALSE(ended);
     EXPECT_EQ(ended.error().kind, ErrorKind::interrupted);
     EXPECT_FALSE(fs::exists(at("a.stipple")));
+}
+
+TEST_F(Api, BytesInMemoryBuildTheStoreOfTheFile) {
+    const std::string ball = writeBall("ball.ply"), bytes = bytesOf(ball);
+    ASSERT_TRUE(stipple::build({ball}, at("file.stipple")));
+    fs::remove(ball);
+    const auto built = stipple::buildBytes({{"ball.ply", bytes.data(), bytes.size()}}, at("memory.stipple"));
+    ASSERT_TRUE(built) << built.error().line();
+    EXPECT_EQ(built->kept, 4000u);
+    EXPECT_EQ(bytesOf(at("memory.stipple")), bytesOf(at("file.stipple")));
+    EXPECT_EQ(stipple_build_bytes("ball.ply", bytes.data(), bytes.size(), at("c.stipple").c_str()), 0);
+    EXPECT_EQ(bytesOf(at("c.stipple")), bytesOf(at("file.stipple")));
+    EXPECT_EQ(stipple_build_bytes("ball.ply", nullptr, 3, at("c.stipple").c_str()), 2);
+    EXPECT_EQ(stipple_build_bytes("ball.ply", bytes.data(), 0, at("c.stipple").c_str()), 3);
+    // It is drawn.
+    const auto store = stipple::Store::open(at("memory.stipple"));
+    ASSERT_TRUE(store);
+    const auto scene = stipple::Scene::of({{*store, {}}});
+    ASSERT_TRUE(scene);
+    const auto image = Api::renderer(Api::device(), *scene).render(scene->overview(1), 48, 48);
+    ASSERT_TRUE(image);
+    size_t covered = 0;
+    for (size_t i = 3; i < image->rgba.size(); i += 4) covered += image->rgba[i] > 0 ? 1 : 0;
+    EXPECT_GT(covered, 500u);
+    // Half of it, what is no input, and a store.
+    const auto half = stipple::buildBytes({{"half.ply", bytes.data(), bytes.size() / 2}}, at("half.stipple"));
+    ASSERT_FALSE(half);
+    EXPECT_NE(half.error().line().find("half.ply"), std::string::npos) << half.error().line();
+    EXPECT_FALSE(fs::exists(at("half.stipple")));
+    const auto vdb = stipple::buildBytes({{"a.vdb", "something", 9}}, at("half.stipple"));
+    ASSERT_FALSE(vdb);
+    EXPECT_NE(vdb.error().line().find("a.vdb: is OpenVDB, which is read from files only"), std::string::npos);
+    const std::string whole = bytesOf(at("file.stipple"));
+    EXPECT_FALSE(stipple::buildBytes({{"a.ply", whole.data(), whole.size()}}, at("half.stipple")));
+}
+
+TEST_F(Api, MeshesAndScenesInMemoryBuildTheStoreOfTheFile) {
+    std::ofstream(at("a.ply")) << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                                  "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                                  "end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
+    std::ofstream(at("b.obj")) << "mtllib m.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n";
+    std::ofstream(at("m.mtl")) << "newmtl red\nKd 1 0 0\n";
+    std::ofstream(at("c.swc")) << "1 1 0 0 0 1 -1\n2 3 0 0 1 0.5 1\n3 3 0 0 2 0.5 2\n";
+    for (const std::string name : {"a.ply", "b.obj", "c.swc"}) {
+        SCOPED_TRACE(name);
+        const std::string bytes = bytesOf(at(name)), material = bytesOf(at("m.mtl"));
+        const auto ofFile = stipple::build({at(name)}, at("file.stipple"));
+        ASSERT_TRUE(ofFile) << ofFile.error().line();
+        fs::rename(at(name), at("gone"));
+        const stipple::Resolve resolve = [&](const std::string& wanted) -> stipple::Result<std::vector<uint8_t>> {
+            if (wanted != "m.mtl") return stipple::Error{ErrorKind::input, "is not there", wanted, ""};
+            return std::vector<uint8_t>(material.begin(), material.end());
+        };
+        const std::vector<stipple::Bytes> input{{name, bytes.data(), bytes.size()}};
+        const auto built = stipple::buildBytes(input, at("memory.stipple"), {}, resolve);
+        ASSERT_TRUE(built) << built.error().line();
+        EXPECT_EQ(built->primitive, ofFile->primitive);
+        EXPECT_EQ(bytesOf(at("memory.stipple")), bytesOf(at("file.stipple")));
+        // Without what it names, which lies beside the place where it was, it is another.
+        const auto alone = stipple::buildBytes(input, at("alone.stipple"));
+        ASSERT_TRUE(alone) << alone.error().line();
+        EXPECT_EQ(bytesOf(at("alone.stipple")) == bytesOf(at("file.stipple")), name != "b.obj");
+    }
+}
+
+TEST_F(Api, NamesOfPointsAreNoFiles) {
+    // A folder of scans of that name, seen from where the program runs, is another's.
+    writeBall("ball.ply");
+    const std::string bytes = bytesOf(at("ball.ply"));
+    stipple::PointSource source = grid();
+    source.name = folder_.string();
+    const auto points = stipple::buildPoints(source, at("grid.stipple"));
+    ASSERT_TRUE(points) << points.error().line();
+    EXPECT_EQ(points->in, 8000u);
+    writeBall("other.ply");
+    for (const std::string& name : {folder_.string(), at("*.ply")}) {
+        const auto built = stipple::buildBytes({{name, bytes.data(), bytes.size()}}, at("b.stipple"));
+        ASSERT_TRUE(built) << built.error().line();
+        EXPECT_EQ(built->in, 4000u);
+    }
 }
 
 TEST_F(Api, TheSubsetForCRefusesWhatIsNotThereAndDrawsTheSame) {

@@ -182,6 +182,48 @@ TEST_F(Asked, ADemoMakesItsFolder) {
     EXPECT_FALSE(object == picture("--refract environment"));
 }
 
+TEST_F(Asked, AWalkThroughADemoListsWhichEffectsCameAndWent) {
+    ASSERT_EQ(runProgram(folder(), "grow demo -o demo --points 5k --leaves 1k").code, 0);
+    // From glass and mirrors to the sky, where nothing is, and back.
+    test::spit(path("walk.json"), R"({"fps": 1, "keys": [
+        {"t": 0, "eye": [0, 4, 40], "target": [0, 2, 24], "up": [0, 1, 0], "fov": 55},
+        {"t": 1, "eye": [0, 4, 40], "target": [0, 90, 44], "up": [0, 0, 1], "fov": 40},
+        {"t": 2, "eye": [-24, 5, 14], "target": [-40, 4, -10], "up": [0, 1, 0], "fov": 60}]})");
+    const std::string walk = "render demo/demo.glb -o w.png --force --size 96x54 --error 4 --camera-path walk.json ";
+    const auto changesOf = [&](const std::string& more) {
+        const Outcome r = runProgram(folder(), walk + more + " --json");
+        EXPECT_EQ(r.code, 0) << r.err;
+        return nlohmann::json::parse(r.out, nullptr, false)["effect_changes"];
+    };
+    const auto linesOf = [](const nlohmann::json& changes, const std::string& effect) {
+        std::string all;
+        for (const auto& c : changes)
+            if (c["effect"] == effect)
+                all += fmt::format("{} {}, ", c["picture"].get<int>(), c["change"].get<std::string>());
+        return all;
+    };
+    const nlohmann::json all = changesOf("");
+    for (const char* effect : {"shadow", "fog", "occlusion", "light"})
+        EXPECT_EQ(linesOf(all, effect), "0 came, 1 went, 2 came, ") << effect;
+    EXPECT_EQ(linesOf(all, "refraction"), "0 came, 1 went, ") << "there is no glass between the rows";
+    EXPECT_EQ(linesOf(all, "wind"), "") << "the control: nobody asked for it";
+    for (const auto& c : all) {
+        const std::string by = c["called_for_by"];
+        if (c["effect"] == "fog") EXPECT_EQ(by, "the scene file");
+        if (c["effect"] == "refraction") EXPECT_EQ(by, "--material, or a material");
+        EXPECT_FALSE(by.empty()) << c;
+    }
+    EXPECT_EQ(linesOf(changesOf("--effects none"), "fog"), "");
+    const Outcome told = runProgram(folder(), walk);
+    EXPECT_TRUE(says(told.out, "picture 0: fog came (the scene file)")) << told.out;
+    EXPECT_TRUE(says(told.out, "picture 1: fog went (the scene file)")) << told.out;
+    const Outcome own = runProgram(folder(),
+                                   "render demo/demo.glb -o w.png --force --size 48x27 --error 8 "
+                                   "--camera-path demo/walk.json --frames 7");
+    EXPECT_EQ(own.code, 0) << own.err;
+    EXPECT_TRUE(says(own.out, "went")) << own.out;
+}
+
 TEST_F(Asked, AViewOfNothingSaysSo) {
     for (const char* mode : {"pullpush", "splat", "reference"}) {
         const std::string of = modeFast(mode), off = of + " --eye 0,0,50 --target 0,0,90";

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <sstream>
 
 #include "engine/render/draw_list.h"
 #include "engine/render/effects/request.h"
@@ -226,6 +228,66 @@ TEST(SceneEffects, OfAnotherShapeAreLeftOutWithANote) {
     const auto read = scene::readGltf(folder / "c.gltf");
     ASSERT_TRUE(read);
     EXPECT_TRUE(read->notes.empty()) << "somebody else's";
+}
+
+/// Rows of README.md's table of effects: what is between their bars.
+std::vector<std::vector<std::string>> rowsOfReadme() {
+    std::istringstream readme(test::slurp(std::string(STIPPLE_SOURCE_DIR) + "/README.md"));
+    std::vector<std::vector<std::string>> rows;
+    bool isTable = false;
+    for (std::string line; std::getline(readme, line);) {
+        if (line.starts_with("| effect |")) isTable = true;
+        if (!isTable || line.starts_with("|---") || line.starts_with("| effect |")) continue;
+        if (!line.starts_with("|")) break;
+        std::vector<std::string>& row = rows.emplace_back();
+        std::istringstream cells(line.substr(1));
+        for (std::string cell; std::getline(cells, cell, '|');) row.push_back(cell);
+    }
+    return rows;
+}
+/// What stands between backquotes.
+std::vector<std::string> quotedIn(const std::string& text) {
+    std::vector<std::string> out;
+    for (size_t at = text.find('`'); at != std::string::npos;) {
+        const size_t end = text.find('`', at + 1);
+        if (end == std::string::npos) break;
+        out.push_back(text.substr(at + 1, end - at - 1));
+        at = text.find('`', end + 1);
+    }
+    return out;
+}
+/// All test programs' sources, one after another.
+std::string testSources() {
+    std::string all;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(std::string(STIPPLE_SOURCE_DIR) + "/tests"))
+        if (entry.path().extension() == ".cpp") all += test::slurp(entry.path().string());
+    return all;
+}
+
+TEST(EffectsOfTheReadme, AreAllOfTheTableWithWhoCallsForThemCostAndATestThatIsThere) {
+    const auto rows = rowsOfReadme();
+    const std::string sources = testSources();
+    const auto isThere = [&](const std::string& test) {  // Suite.Name or Suite.*
+        const std::string suite = test.substr(0, test.find('.')), name = test.substr(test.find('.') + 1);
+        const std::string end = name == "*" ? "" : name + ")";
+        return sources.find("TEST_F(" + suite + ", " + end) != std::string::npos ||
+               sources.find("TEST(" + suite + ", " + end) != std::string::npos;
+    };
+    EXPECT_FALSE(isThere("ZeroCost.NoSuchTestIsThere")) << "the control";
+    for (const Effect* e : effects())
+        EXPECT_TRUE(std::any_of(rows.begin(), rows.end(), [&](const std::vector<std::string>& row) {
+            return row.front().find(std::string("(`") + e->name + "`)") != std::string::npos;
+        })) << e->name;
+    EXPECT_GE(rows.size(), effects().size());
+    for (const std::vector<std::string>& row : rows) {
+        ASSERT_GE(row.size(), 4u) << row.front();
+        EXPECT_GT(row[1].size(), 3u) << row.front() << ": who calls for it";
+        EXPECT_GT(row[2].size(), 3u) << row.front() << ": what it costs";
+        EXPECT_TRUE(row[3].starts_with(" 0: ")) << row.front();
+        const std::vector<std::string> tests = quotedIn(row[3]);
+        EXPECT_FALSE(tests.empty()) << row.front();
+        for (const std::string& test : tests) EXPECT_TRUE(isThere(test)) << row.front() << test;
+    }
 }
 
 }  // namespace

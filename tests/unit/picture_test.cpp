@@ -119,6 +119,36 @@ TEST_F(Picture, IsOpaqueAndShowsItsBackground) {
     EXPECT_EQ(render("a.ply", "--alpha --mode reference --samples 2").front()[3], 0u);
 }
 
+TEST_F(Picture, ShowsItsEnvironmentWhereThatIsTheBackground) {
+    test::writePly(folder_ / "a.ply", test::bumpySphere(500, 1));
+    std::string bytes = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n";
+    for (int i = 0; i < 16 * 8; ++i) bytes += {char(-128), 64, 32, char(-128)};  // 1/2, 1/4, 1/8
+    test::spit(folder_ / "even.hdr", bytes);
+    const std::array<uint32_t, 4> even{188, 137, 99, 255};  // sRGB
+    const auto isEven = [&](const std::array<uint32_t, 4>& p) {
+        for (size_t k = 0; k < 4; ++k)
+            if (std::abs(int(p.at(k)) - int(even.at(k))) > 1) return false;
+        return true;
+    };
+    EXPECT_FALSE(isEven(render("a.ply", "--environment even.hdr").front())) << "the control: it lights, and no more";
+    EXPECT_TRUE(isEven(render("a.ply", "--environment even.hdr --background environment").front()));
+    EXPECT_TRUE(isEven(
+        render("a.ply", "--environment even.hdr --background environment --mode reference --samples 2").front()));
+    const auto backgroundOf = [&](const std::string& more) {
+        const nlohmann::json j =
+            json("render a.ply -o a.png --force --size 96x64 --device cpu --json --environment even.hdr " + more);
+        for (const nlohmann::json& e : j["effects"])
+            if (e["name"] == "background") return e;
+        return nlohmann::json();
+    };
+    const nlohmann::json shown = backgroundOf("--background environment"), none = backgroundOf("");
+    EXPECT_EQ(shown["called_for_by"], "--background environment");
+    EXPECT_TRUE(shown["active"].get<bool>());
+    EXPECT_EQ(shown["passes"], 1);
+    EXPECT_FALSE(none["requested"].get<bool>() || none["active"].get<bool>());
+    EXPECT_EQ(none["passes"], 0);
+}
+
 TEST_F(Picture, CoverageIsKeptApartFromColour) {
     render::Image image;
     image.width = 3;

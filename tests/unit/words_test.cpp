@@ -95,6 +95,8 @@ TEST(Words, OutputsThatCannotBeAreFoundBeforeTheWork) {
     expectOneLine(runProgram(folder, render + "--camera-path no.json"), 3, {"no.json"});
     expectOneLine(runProgram(folder, render + "--environment no.hdr"), 3, {"no.hdr"});
     expectOneLine(runProgram(folder, render + "--background 0,0,256"), 2, {"--background"});
+    expectOneLine(runProgram(folder, render + "--background environment"), 2,
+                  {"--background environment", "--environment, which is not given"});
     expectOneLine(runProgram(folder, render + "--colour height --colour-map jet"), 2, {"jet"});
     const Outcome cached = runProgram(folder, "cache list");
     EXPECT_EQ(cached.out.find("a.las"), std::string::npos) << "nothing was built: " << cached.out;

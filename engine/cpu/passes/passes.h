@@ -24,6 +24,7 @@ struct RowPass {
     /// What light needs to know of surfaces that are seen beside those of the pixels, before it lights them. Null:
     /// nothing of this pass.
     void (*beside)(const RowPlace& at, SurfaceRow& second) = nullptr;
+    bool showsEmpty = false;  ///< rows without anything are not all alike
 };
 
 /// One of the two. A pass of rows that reads its neighbours (passes.inl) begins a run of its own, and finds the whole

@@ -70,8 +70,10 @@ class RowProgram {
           isKept_(!render::passInfo(passes.back()).writes.has(render::Plane::image)),
           isFirst_(passes.front() == render::Pass::surface),
           empty_(emptyPixel(frame)) {
-        for (const render::Pass pass : passes)
+        for (const render::Pass pass : passes) {
             if (pass != render::Pass::surface) steps_.push_back({&cpuPassOf(pass).row, takesMixed(pass)});
+            showsEmpty_ = showsEmpty_ || cpuPassOf(pass).row.showsEmpty;
+        }
         for (const render::Pass pass : later) {
             const CpuPass& p = cpuPassOf(pass);
             if (p.row.wants != nullptr)
@@ -97,6 +99,7 @@ class RowProgram {
         const SurfaceWants wants = wantsOf(planes);
         thread_local SurfaceRow surface{};
         surface.shadowSlots = 0;
+        surface.hasBehind = false;
         SurfaceWants made = wants;
         made.depth = made.depth || smooth != nullptr;
         frame_.k.surfaceRow(f, own, row, planes, made, x0, y, n, surface);
@@ -114,6 +117,7 @@ class RowProgram {
         const SurfacePlanes planes = planesOf(at);
         thread_local SurfaceRow surface{};
         surface.shadowSlots = 0;
+        surface.hasBehind = false;
         if (!takeRow(at, planes, wantsOf(planes), surface)) return finishEmpty(at);
         finish(at, planes, surface);
     }
@@ -181,12 +185,27 @@ class RowProgram {
     }
     void finishEmpty(const RowPlace& at) const {
         if (isKept_ && isFirst_) std::fill_n(keptAt(frame_, at.first).depth, at.n, 0.0f);
+        if (!isKept_ && showsEmpty_) return showEmpty(at);
         if (!isKept_) empty_.fill(outputAt(frame_, at.first), at.n);
+    }
+    /// Rows of several empty tiles come as one; passes take those of a tile at most.
+    void showEmpty(const RowPlace& whole) const {
+        thread_local SurfaceRow nothing{};
+        for (uint32_t done = 0; done < whole.n; done += kTile) {
+            RowPlace at = whole;
+            at.x0 += done;
+            at.first += done;
+            at.n = std::min(whole.n - done, kTile);
+            for (const Step& step : steps_)
+                if (step.pass->showsEmpty) step.pass->run(at, nothing);
+            cpuPassOf(render::Pass::output).row.run(at, nothing);
+        }
     }
 
     Frame& frame_;
     Level& fine_;
     bool isKept_;
+    bool showsEmpty_ = false;
     bool isFirst_;         ///< surfaces are made in this run; else an earlier one has kept them
     SurfaceWants kept_{};  ///< of later passes
     EmptyPixel empty_;

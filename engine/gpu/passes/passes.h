@@ -7,6 +7,7 @@ namespace stipple::gpu {
 
 struct GpuPass {
     void (*record)(Recording& frame);
+    bool isBeside = false;  ///< no part of a shader of several passes: recorded before those that it stands among
 };
 #define STIPPLE_PASS(name, reads, writes, isOfOwnPixel) extern const GpuPass name##Pass;
 #include "engine/render/passes.inl"

@@ -40,6 +40,22 @@ struct BuildReport {
 STIPPLE_API Result<BuildReport> build(const std::vector<std::string>& inputs, const std::string& store,
                                       const BuildSettings& settings = {});
 
+/// Bytes in memory that stand for a file. They are the caller's, and stay as they are while a build runs.
+struct Bytes {
+    std::string name;  ///< "scan.ply": for messages; its ending says the format where the bytes do not
+    const void* data = nullptr;
+    uint64_t count = 0;
+};
+
+/// What a scene names: buffers, textures, MTL. `name` is as the scene has it, decoded ("textures/a b.png"), or a URL.
+using Resolve = std::function<Result<std::vector<uint8_t>>(const std::string& name)>;
+
+/// The same of inputs in memory: points (LAS, LAZ, PLY), triangles (PLY), curves, or one scene with meshes. No file is
+/// read for them: what a scene names and `resolve` does not give is missing. The store has the bytes that it would have
+/// of files of these names. A build that was interrupted begins anew.
+STIPPLE_API Result<BuildReport> buildBytes(const std::vector<Bytes>& inputs, const std::string& store,
+                                           const BuildSettings& settings = {}, const Resolve& resolve = {});
+
 /// A run of points. Arrays are empty (absent) or as long as `position`.
 struct Points {
     std::vector<Vec3> position;

@@ -27,6 +27,9 @@ typedef struct stipple_camera {
 STIPPLE_C_API const char* stipple_last_error(void);
 
 STIPPLE_C_API int stipple_build(const char* const* inputs, unsigned count, const char* store);
+/* Of one input in memory; name: "scan.ply", whose ending says the format where the bytes do not. What a scene names
+   beside itself is missing. */
+STIPPLE_C_API int stipple_build_bytes(const char* name, const void* bytes, uint64_t count, const char* store);
 
 STIPPLE_C_API int stipple_device_open(const char* name, stipple_device** device);
 STIPPLE_C_API void stipple_device_close(stipple_device* device);

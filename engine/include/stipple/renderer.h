@@ -35,9 +35,12 @@ struct RenderSettings {
     std::vector<std::string> effectValues;  ///< NAME.PARAMETER=VALUE
     std::string shade = "auto";             ///< auto, lit or unlit
     std::array<uint8_t, 3> background{39, 39, 44};  ///< sRGB
-    double windShare = 0;                           ///< how far tops of plants move at most, share of their height
-    double seconds = 0;                             ///< of the wind
-    bool wantDepthAndNormal = false;                ///< and linear colours
+    std::string environment;      ///< HDR picture all around that lights the scene (equirectangular); empty: none
+    double environmentScale = 1;  ///< factor of its light
+    bool environmentIsBackground = false;  ///< it is seen behind the scene, too, instead of `background`
+    double windShare = 0;                  ///< how far tops of plants move at most, share of their height
+    double seconds = 0;                    ///< of the wind
+    bool wantDepthAndNormal = false;       ///< and linear colours
 };
 
 /// What became of a frame.

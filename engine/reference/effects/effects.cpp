@@ -28,6 +28,12 @@ void applyOnSurface(const render::DrawList& draws, Level& level) {
         if (kRestated.at(e)->onSurface != nullptr && draws.effects.has(e)) kRestated.at(e)->onSurface(draws, level);
 }
 
+glm::dvec3 behindAll(const render::DrawList& draws, const glm::dvec2& pixel) {
+    for (size_t e = 0; e < kRestated.size(); ++e)
+        if (kRestated.at(e)->behind != nullptr && draws.effects.has(e)) return kRestated.at(e)->behind(draws, pixel);
+    return glm::dvec3(draws.frame.background);
+}
+
 glm::dvec3 applyOnSent(const render::DrawList& draws, const glm::dvec3& sent, const glm::dvec2& pixel, double depth) {
     glm::dvec3 arriving = sent;
     for (size_t e = 0; e < kRestated.size(); ++e)

@@ -3,13 +3,10 @@
 
 #include "engine/reference/effects/effects.h"
 #include "shaders/shared/bindings.h"
-#include "shaders/shared/tone.h"
 
 namespace stipple::reference {
-namespace {
 
-glm::dvec3 onSent(const render::DrawList& draws, const glm::dvec3& sent, const glm::dvec2&, double) {
-    const auto& tone = *draws.tableAt<shared::ToneConstants>(shared::kToneBinding);
+glm::dvec3 tonedLight(const shared::ToneConstants& tone, const glm::dvec3& sent) {
     glm::dvec3 out = double{tone.exposure} * sent;
     if (tone.isFilmic == 0) return out;
     for (int c = 0; c < 3; ++c) {
@@ -17,6 +14,12 @@ glm::dvec3 onSent(const render::DrawList& draws, const glm::dvec3& sent, const g
         out[c] = std::min((2.51 * x * x + 0.03 * x) / (2.43 * x * x + 0.59 * x + 0.14), 1.0);
     }
     return out;
+}
+
+namespace {
+
+glm::dvec3 onSent(const render::DrawList& draws, const glm::dvec3& sent, const glm::dvec2&, double) {
+    return tonedLight(*draws.tableAt<shared::ToneConstants>(shared::kToneBinding), sent);
 }
 
 }  // namespace

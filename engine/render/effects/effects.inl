@@ -17,4 +17,5 @@ STIPPLE_EFFECT(occlusion)
 STIPPLE_EFFECT(edl)
 STIPPLE_EFFECT(fog)
 STIPPLE_EFFECT(tone)
+STIPPLE_EFFECT(background)
 #endif

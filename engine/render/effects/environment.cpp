@@ -1,7 +1,6 @@
 // Environment: a picture of the surroundings (environment.h) in the place of the plain sky. Light's pass reads its
 // table.
 #include <array>
-#include <cmath>
 
 #include "engine/render/draw_list.h"
 #include "engine/render/effects/effect.h"
@@ -15,15 +14,12 @@ namespace {
 
 constexpr std::array kTables{shared::kEnvironmentBinding};
 
-/// The environment's y is the scene's up, its -z as near to the scene's as that allows.
 void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out) {
     shared::FrameConstants& f = out.frame;
-    const glm::dvec3 up = glm::normalize(settings.worldUp);
-    const glm::dvec3 aside = std::abs(up.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
-    const glm::dvec3 back = glm::normalize(glm::cross(aside, up)), right = glm::cross(up, back);
-    f.environmentX = glm::vec3(cameraFromWorld * right);
-    f.environmentY = glm::vec3(cameraFromWorld * up);
-    f.environmentZ = glm::vec3(cameraFromWorld * back);
+    const glm::dmat3 axes = environmentAxes(settings.worldUp);
+    f.environmentX = glm::vec3(cameraFromWorld * axes[0]);
+    f.environmentY = glm::vec3(cameraFromWorld * axes[1]);
+    f.environmentZ = glm::vec3(cameraFromWorld * axes[2]);
     f.hasEnvironment = 1;
     f.environmentSharp = settings.environment->sharpEdge;
     f.ambient = 1;

@@ -1,5 +1,6 @@
 // Fog and aerial perspective (shaders/shared/fog.h). Where nothing is seen there is none: how far the air goes behind
-// the scene is not known, and its colour, unless another one is given, is that of the background.
+// the scene is not known, and its colour, unless another one is given, is that of the background (of the environment's
+// picture behind everything: its mean, the light that air without a direction of its own sends on).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -54,7 +55,7 @@ glm::dvec3 densityOf(const FogSettings& fog) {
 }
 
 glm::vec3 colourOf(const DrawSettings& settings) {
-    glm::vec3 colour = settings.background;
+    glm::vec3 colour = showsBackdrop(settings) ? settings.backdrop->mean : settings.background;
     for (size_t c = 0; c < 3; ++c)
         if (const double given = settings.parameters.fog.colour.at(c); given >= 0)
             colour[static_cast<int>(c)] = shared::linearFromSrgb(static_cast<float>(given / 255));

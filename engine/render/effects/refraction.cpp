@@ -32,7 +32,7 @@ extern const Effect refractionEffect;
 constinit const Effect refractionEffect{.name = "refraction",
                                         .summary = "glass and water: what is behind them, bent",
                                         .isRequested = [](const DrawSettings& s) { return s.layer != nullptr; },
-                                        .option = "--material",
+                                        .option = "--material, or a material",
                                         .ofFrame = [](const EffectFrame& frame) { return !frame.content.isEmpty(); },
                                         .fill = fill,
                                         .stage = Stage::light,

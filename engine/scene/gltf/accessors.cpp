@@ -36,7 +36,7 @@ bool decodeBase64(std::string_view text, std::vector<uint8_t>& out) {
     return true;
 }
 
-/// The bytes behind a URI: data, or a file beside the glTF file.
+/// The bytes behind a URI: data, or a file beside the glTF file (or what stands for one).
 Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, const std::string& where,
                                    const ReadSettings& settings) {
     std::vector<uint8_t> bytes;
@@ -51,10 +51,11 @@ Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, c
         }
         return bytes;
     }
-    if (uri.find("://") != std::string::npos)
+    const bool isAddress = uri.find("://") != std::string::npos;
+    if (isAddress && !c.resolve)
         return fail(ErrorKind::input, fmt::format("lies at {}, and only local files are read", uri), where,
                     "download it first");
-    return readFileOfScene(c.folder, nameOfUri(uri), settings);
+    return readNamed(c.resolve, c.folder, isAddress ? uri : nameOfUri(uri), settings);
 }
 
 double component(const uint8_t* at, int type, bool normalised) {

@@ -203,6 +203,11 @@ Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c, uin
 
 Result<Container> readContainer(const std::string& path, uint64_t memoryBytes) {
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    return readContainer(file, memoryBytes);
+}
+
+Result<Container> readContainer(const ByteSource& file, uint64_t memoryBytes) {
+    const std::string& path = file.path();
     Container c;
     c.path = path;
     c.folder = std::filesystem::path(path).parent_path().string();

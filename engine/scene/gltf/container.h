@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/byte_source.h"
 #include "engine/base/result.h"
+#include "engine/scene/scene_bytes.h"
 
 namespace stipple::scene::gltf {
 
@@ -14,11 +16,13 @@ struct Container {  // NOLINT(bugprone-exception-escape): moving JSON checks its
     std::vector<uint8_t> binary;  ///< chunk 1 of a .glb
     bool isBinary = false, hasBinaryChunk = false;
     std::string path, folder;
+    Resolve resolve;  ///< what it names; empty: files in `folder`
     uint64_t fileBytes = 0;
     std::vector<std::string> oddities;  ///< not as the format has it, and passed over
 };
 
 /// `.gltf` or `.glb`, told by content. Errors name the offset. What would take more than `memoryBytes` is refused.
+Result<Container> readContainer(const ByteSource& file, uint64_t memoryBytes = uint64_t{2} << 30);
 Result<Container> readContainer(const std::string& path, uint64_t memoryBytes = uint64_t{2} << 30);
 
 }  // namespace stipple::scene::gltf

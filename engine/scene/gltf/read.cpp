@@ -7,12 +7,13 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "engine/base/file.h"
 #include "engine/base/numbers.h"
 #include "engine/scene/gltf/check.h"
 #include "engine/scene/gltf/effects.h"
 #include "engine/scene/gltf/json_tools.h"
 #include "engine/scene/gltf/looks.h"
-#include "engine/scene/scene.h"
+#include "engine/scene/scene_bytes.h"
 
 namespace stipple::scene {
 namespace {
@@ -277,7 +278,13 @@ class Reader {
                 node.light = which < scene_.lights.size() ? static_cast<int>(which) : -1;
             }
             if (const json& store = extensionOf(j, "STIPPLE_store"); store.is_object()) {
-                STIPPLE_ASSIGN(node.store, fileOfScene(c_.folder, store["uri"].get<std::string>(), settings_));
+                const auto uri = store["uri"].get<std::string>();
+                if (c_.resolve) {  // (a store is read bit by bit as it is drawn)
+                    scene_.notes.push_back(fmt::format(
+                        "node '{}' places the store '{}', which is read from a file only: left out", node.name, uri));
+                } else {
+                    STIPPLE_ASSIGN(node.store, fileOfScene(c_.folder, uri, settings_));
+                }
             }
             if (const json& visible = extensionOf(j, "KHR_node_visibility"); visible.is_object())
                 node.isVisible = visible.value("visible", true);
@@ -301,8 +308,15 @@ class Reader {
 }  // namespace
 
 Result<Scene> readGltf(const std::string& path, const ReadSettings& settings) {
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    return readGltf(file, settings, {});
+}
+
+Result<Scene> readGltf(const ByteSource& file, const ReadSettings& settings, const Resolve& resolve) {
+    const std::string& path = file.path();
     try {
-        STIPPLE_ASSIGN(gltf::Container c, gltf::readContainer(path, settings.memoryBytes));
+        STIPPLE_ASSIGN(gltf::Container c, gltf::readContainer(file, settings.memoryBytes));
+        c.resolve = resolve;
         gltf::Buffers buffers(c, settings);
         STIPPLE_ASSIGN(const std::vector<std::string> passedOver, gltf::requireGood(c, buffers, settings.isStrict));
         STIPPLE_ASSIGN(Scene scene, Reader(c, buffers, settings).read());

@@ -67,16 +67,22 @@ Result<lod::BuildReport> buildMeshFiles(const std::vector<std::string>& files, c
                                         const OpenSettings& build, lod::MeshBuildSettings settings, Executor& executor,
                                         Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings wanted, build.settings());
-    settings.readerShare = 0.25;
-    const auto forReader = static_cast<uint64_t>(settings.readerShare * static_cast<double>(wanted.memoryBytes));
+    const auto forReader = static_cast<uint64_t>(kReaderShare * static_cast<double>(wanted.memoryBytes));
     lod::FormatOptions more = build.formatOptions();
     if (more.tempFolder.empty()) more.tempFolder = fs::absolute(output).parent_path().string();
     more.memoryBytes = forReader;
     STIPPLE_ASSIGN(const lod::OpenedMesh mesh, openMeshes(files, more));
     settings.description.source = fs::path(files.front()).filename().string();
     if (files.size() > 1) settings.description.source += fmt::format(" and {} more", files.size() - 1);
-    settings.limits = wanted;
-    settings.limits.memoryBytes -= forReader;
+    return buildOpened(mesh, forReader, output, build, std::move(settings), executor, progress);
+}
+
+Result<lod::BuildReport> buildOpened(const lod::OpenedMesh& mesh, uint64_t held, const std::string& output,
+                                     const OpenSettings& build, lod::MeshBuildSettings settings, Executor& executor,
+                                     Progress& progress) {
+    STIPPLE_ASSIGN(settings.limits, build.settings());
+    settings.readerShare = kReaderShare;
+    settings.limits.memoryBytes -= held;
     STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(mesh.source, output, settings, executor, progress));
     report.notes.insert(report.notes.begin(), mesh.notes.begin(), mesh.notes.end());
     return report;

@@ -20,6 +20,8 @@ struct MeshFiles {
     /// What is lost where they are built as points, beside files that have nothing else; empty: nothing.
     std::string note() const;
 };
+/// Of the memory for a build, what a reader of triangles holds.
+constexpr double kReaderShare = 0.25;
 /// What --surfels is told where there are no meshes.
 tl::unexpected<Error> nothingToSample(const std::string& input);
 /// What --material is told where there are no points.
@@ -30,6 +32,11 @@ Result<MeshFiles> findMeshFiles(const std::vector<std::string>& inputs, const Op
 Result<lod::BuildReport> buildMeshFiles(const std::vector<std::string>& files, const std::string& output,
                                         const OpenSettings& build, lod::MeshBuildSettings settings, Executor& executor,
                                         Progress& progress);
+
+/// The same of what is open; `held`: what it holds of the memory asked for.
+Result<lod::BuildReport> buildOpened(const lod::OpenedMesh& mesh, uint64_t held, const std::string& output,
+                                     const OpenSettings& build, lod::MeshBuildSettings settings, Executor& executor,
+                                     Progress& progress);
 
 /// The triangles of several files as one, with what there is to say of each.
 Result<lod::OpenedMesh> openMeshes(const std::vector<std::string>& files, const lod::FormatOptions& more);

@@ -14,6 +14,7 @@
 #include "engine/image/image_io.h"
 #include "engine/scene/curves.h"
 #include "engine/scene/gltf/container.h"
+#include "engine/scene/open/build_bytes.h"
 #include "engine/scene/open/builds_of_scene.h"
 #include "engine/scene/open/cache.h"
 #include "engine/scene/open/mesh_files.h"
@@ -126,7 +127,8 @@ lod::CurveBuildSettings curveSettings(const std::string& input) {
     return settings;
 }
 
-/// Ribbons and tubes.
+}  // namespace
+
 Result<lod::BuildReport> buildCurves(const lod::CurveSource& raw, const std::string& input, const std::string& output,
                                      const OpenSettings& build, Executor& executor, Progress& progress) {
     lod::CurveBuildSettings settings = curveSettings(input);
@@ -142,6 +144,8 @@ Result<lod::BuildReport> buildCurves(const lod::CurveSource& raw, const std::str
         };
     return lod::buildCurveStore(lod::cleanSource(turned, build.curveRadius), output, settings, executor, progress);
 }
+
+namespace {
 
 Result<lod::BuildReport> buildCurveFile(const std::string& input, const std::string& output, const OpenSettings& build,
                                         Executor& executor, Progress& progress) {
@@ -323,11 +327,14 @@ Result<void> openSceneFile(const std::string& path, const OpenSettings& options,
     return {};
 }
 
-/// Of files of triangles; their paths are made by whoever builds them.
+}  // namespace
+
 Result<lod::MeshBuildSettings> meshFileSettings(const OpenSettings& build) {
     scene::Scene plain;
     return meshSettings(plain, {}, build);
 }
+
+namespace {
 
 /// Scene files are read as a whole: is there memory for that? What is asked for suffices for the build that follows.
 Result<void> checkSceneMemory(const std::string& path, uint64_t memoryBytes) {
@@ -399,6 +406,15 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
     STIPPLE_TRY(checkSceneMemory(inputs.front(), settings.memoryBytes));
     STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front(), build.reading()));
+    return buildReadScene(
+        std::move(scene), output, build, [&] { return lod::buildStore(inputs, output, settings, executor, progress); },
+        executor, progress);
+}
+
+Result<lod::BuildReport> buildReadScene(scene::Scene scene, const std::string& output, const OpenSettings& build,
+                                        const std::function<Result<lod::BuildReport>()>& buildPoints,
+                                        Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     const lod::MeshSource triangles = scene::triangleSource(scene, scene::placements(scene));
     const auto counted = [&](scene::PrimitiveKind kind) {
         uint64_t sum = 0;
@@ -408,11 +424,11 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         return sum;
     };
     const uint64_t lines = counted(scene::PrimitiveKind::lines) / 2, points = counted(scene::PrimitiveKind::points);
-    if (build.material && (triangles.triangles > 0 || points == 0)) return noPointsToLight(inputs.front());
+    if (build.material && (triangles.triangles > 0 || points == 0)) return noPointsToLight(scene.path);
     if (triangles.triangles == 0 && points == 0 && lines > 0)
-        return buildCurves(scene::curveSource(scene, scene::placements(scene)), inputs.front(), output, build, executor,
+        return buildCurves(scene::curveSource(scene, scene::placements(scene)), scene.path, output, build, executor,
                            progress);
-    if (triangles.triangles == 0) return lod::buildStore(inputs, output, settings, executor, progress);
+    if (triangles.triangles == 0) return buildPoints();
     if (lines + points > 0)
         scene.notes.push_back(fmt::format(
             "a store holds one kind of primitive: {} lines and {} points are left out; view the scene file to see all",
@@ -502,6 +518,13 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Open
         say(build, "note: the scene is flat along z, but y is up, as its format has it; is z up? --up z");
     releaseFreeMemory();
     return scene;
+}
+
+Result<std::shared_ptr<const render::Backdrop>> openBackdrop(const std::string& path, double scale,
+                                                             uint64_t memoryBytes, Executor& executor) {
+    STIPPLE_ASSIGN(render::HdrImage image, image::readHdr(path, memoryBytes));
+    return std::make_shared<const render::Backdrop>(
+        render::makeBackdrop(std::move(image), static_cast<float>(scale), executor));
 }
 
 Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,

@@ -8,6 +8,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
+#include "engine/render/backdrop.h"
 #include "engine/render/effects/request.h"
 #include "engine/render/environment.h"
 #include "engine/render/frame.h"
@@ -70,5 +71,8 @@ Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, 
 Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
                                                                    uint64_t memoryBytes, Executor& executor,
                                                                    bool hasMirrors);
+/// The same as what is seen behind everything.
+Result<std::shared_ptr<const render::Backdrop>> openBackdrop(const std::string& path, double scale,
+                                                             uint64_t memoryBytes, Executor& executor);
 
 }  // namespace stipple::scene

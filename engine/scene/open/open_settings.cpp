@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <sstream>
 
 #include "engine/base/process.h"
 #include "engine/base/units.h"
 #include "engine/scene/open/open_scene.h"
+#include "engine/scene/scene_bytes.h"
 #include "lod/store/colour.h"
 #include "lod/store/file_kind.h"
 
@@ -69,11 +69,6 @@ void say(const OpenSettings& to, const std::string& line) {
     if (to.say) to.say(line);
 }
 
-bool isSceneFile(const std::string& path) {
-    const lod::FileKind kind = lod::fileKindOf(path);
-    if (kind != lod::FileKind::other) return kind == lod::FileKind::glb;
-    const std::string extension = std::filesystem::path(path).extension().string();
-    return extension == ".gltf" || extension == ".glb" || extension == ".obj";
-}
+bool isSceneFile(const std::string& path) { return isScene(path, lod::fileKindOf(path)); }
 
 }  // namespace stipple::scene

@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "engine/base/file.h"
-#include "lod/store/file_kind.h"
 
 namespace stipple::lod {
 namespace {
@@ -21,8 +20,10 @@ std::string extensionOf(const std::string& path, FileKind kind) {
 
 }  // namespace
 
-bool isCurveFile(const std::string& path) {
-    const std::string e = extensionOf(path, fileKindOf(path));
+bool isCurveFile(const std::string& path) { return isCurveFile(path, fileKindOf(path)); }
+
+bool isCurveFile(const std::string& path, FileKind kind) {
+    const std::string e = extensionOf(path, kind);
     return e == ".swc" || e == ".trk" || e == ".hair" || e == ".txt" || e == ".csv";
 }
 

@@ -8,11 +8,13 @@
 #include "engine/base/cursor.h"
 #include "engine/base/result.h"
 #include "lod/primitives/curve_source.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::lod {
 
 /// By what the file begins with, then by extension: .swc, .trk, .hair, .txt and .csv (cylinder models).
 bool isCurveFile(const std::string& path);
+bool isCurveFile(const std::string& path, FileKind kind);
 /// TrackVis and hair files are read block by block; the others, small by nature, as a whole.
 Result<CurveSource> openCurves(const std::string& path);
 Result<CurveSource> openCurves(const std::shared_ptr<const ByteSource>& file);

@@ -252,9 +252,14 @@ class PlyMesh {
 }  // namespace
 
 Result<PlyFaces> plyFaces(const std::string& path) {
-    PlyFaces out;
-    if (fileKindOf(path) != FileKind::ply) return out;
+    if (fileKindOf(path) != FileKind::ply) return PlyFaces();
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    return plyFaces(file);
+}
+
+Result<PlyFaces> plyFaces(const ByteSource& file) {
+    PlyFaces out;
+    if (fileKindOf(file) != FileKind::ply) return out;
     STIPPLE_ASSIGN(const PlyHeader header, parsePlyHeader(file));
     for (const PlyElement& e : header.elements)
         if (e.name != "vertex" && std::any_of(e.properties.begin(), e.properties.end(), isCornerList))

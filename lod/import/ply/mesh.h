@@ -18,6 +18,7 @@ struct PlyFaces {
 };
 /// None of a file that is no PLY.
 Result<PlyFaces> plyFaces(const std::string& path);
+Result<PlyFaces> plyFaces(const ByteSource& file);
 /// Vertices in file units, two-sided; sRGB 200 where the file has no colours. Where it has no normals, faces that share
 /// a vertex get smooth ones (the sum of the faces', weighted by area). Of the vertices `memoryBytes` are in memory, the
 /// rest in a file in `tempFolder`; faces are read from the file as often as it takes.
