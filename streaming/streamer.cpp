@@ -311,10 +311,11 @@ void Streamer::start(uint32_t sourceIndex, uint32_t chunk) {
     });
     if (!isOfUse) return;
     const ChunkKey key{sourceIndex, chunk};
+    if (spare_.empty()) spare_.push_back(requests_.emplace_back(std::make_unique<Request>()).get());
+    completed_.reserve(requests_.size());
     setState(key, ChunkState::requested);
     ++counters_.inFlight;
     ++counters_.requests;
-    if (spare_.empty()) spare_.push_back(requests_.emplace_back(std::make_unique<Request>()).get());
     Request* const request = spare_.back();
     spare_.pop_back();
     request->key = key;
@@ -338,11 +339,12 @@ bool Streamer::startPage(ChunkKey unknown) {
     PageLife& life = source.pageLives[page];
     if (life.isRequested) return true;
     if (!source.pages || frame_ < life.retryAt) return false;
+    auto request = std::make_unique<PageRequest>();
+    *request = {unknown.source, page, source.hierarchy, source.pages.get(), {}};
+    completedPages_.reserve(pagesInFlight_ + size_t{1});
     life.isRequested = true;
     ++pagesInFlight_;
     ++counters_.inFlight;
-    auto request = std::make_unique<PageRequest>();
-    *request = {unknown.source, page, source.hierarchy, source.pages.get(), {}};
     executor_.read([this, of = request.release()] {
         std::unique_ptr<PageRequest> done(of);
         done->read = orFail([&] { return done->pages->load(*done->hierarchy, done->page); });
@@ -353,7 +355,8 @@ bool Streamer::startPage(ChunkKey unknown) {
 
 void Streamer::collectPages() {
     if (pagesInFlight_ == 0) return;
-    for (const auto& done : completedPages_.takeAll()) {
+    completedPages_.takeAll(takenPages_);
+    for (const auto& done : takenPages_) {
         --pagesInFlight_;
         --counters_.inFlight;
         PageLife& life = sources_[done->source].pageLives[done->page];

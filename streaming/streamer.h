@@ -169,6 +169,7 @@ class Streamer {
     std::vector<Request*> spare_, arrived_, taken_;
     CompletionQueue<Request*> completed_;
     CompletionQueue<std::unique_ptr<PageRequest>> completedPages_;
+    std::vector<std::unique_ptr<PageRequest>> takenPages_;
     uint32_t pagesInFlight_ = 0;
     std::vector<lod::CutWanted> wanted_;
     std::vector<ChunkKey> others_;

@@ -1,6 +1,7 @@
 // A queue between threads. Values move through it. (Mutexes live in this folder only.)
 #pragma once
 
+#include <cstddef>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -14,6 +15,11 @@ class CompletionQueue {
         const std::lock_guard lock(mutex_);
         items_.push_back(std::move(value));
     }
+    /// From now on that many fit without memory being taken: whoever pushes cannot fail.
+    void reserve(size_t count) {
+        const std::lock_guard lock(mutex_);
+        items_.reserve(count);
+    }
     /// Everything that has arrived since the last call, in order of arrival.
     std::vector<T> takeAll() {
         const std::lock_guard lock(mutex_);
@@ -23,6 +29,7 @@ class CompletionQueue {
     void takeAll(std::vector<T>& items) {
         items.clear();
         const std::lock_guard lock(mutex_);
+        items.reserve(items_.capacity());
         std::swap(items, items_);
     }
 

@@ -404,9 +404,13 @@ Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const
     for (;;) {
         lod::planResident(state.scene(), view, settings.budgets, streamer.residentLimit(), barred, state.scratch,
                           state.cut, state.plan);
-        if (streamer.readPages(state.plan.unknown)) continue;
-        planFurtherViews(state, view, settings, barred);
-        if (streamer.readPages(state.plan.unknown)) continue;
+        bool arePagesNew = streamer.readPages(state.plan.unknown);
+        if (!arePagesNew) {
+            planFurtherViews(state, view, settings, barred);
+            arePagesNew = streamer.readPages(state.plan.unknown);
+        }
+        if (arePagesNew && isStopRequested()) return fail(ErrorKind::interrupted, "interrupted");
+        if (arePagesNew) continue;
         const uint64_t failures = streamer.counters().failures;
         STIPPLE_TRY(await(state.plan, streamer));
         if (streamer.counters().failures == failures) break;

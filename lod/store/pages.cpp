@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "engine/base/check.h"
 #include "lod/store/check.h"
@@ -126,6 +127,8 @@ Result<std::shared_ptr<NodePages>> NodePages::open(std::shared_ptr<const ByteSou
 Result<void> NodePages::checkDirectory(const Head& head) const {
     const auto bad = [&] { return tl::unexpected(damagedStore(file_->path(), "the pages of nodes are not possible")); };
     const Places& total = table_.total;
+    const auto isCountable = [](uint64_t count) { return count <= std::numeric_limits<uint32_t>::max(); };
+    if (const auto counts = valuesOf(total); !std::all_of(counts.begin(), counts.end(), isCountable)) return bad();
     if (table_.log2Nodes > 20 || (table_.flags & ~kTableFlags) != 0 || total.nodes != head.nodeCount ||
         table_.pages != ((head.nodeCount - 1) >> table_.log2Nodes) + 1 ||
         total.children != (isGraph_ ? 1 : head.nodeCount) || (isGraph_ && total.groups != head.nodeCount))
@@ -243,29 +246,41 @@ uint32_t NodePages::pageOfParent(uint64_t node) const {
     return static_cast<uint32_t>(after - pages_.begin()) - 1;
 }
 
-Result<NodePages::Loaded> NodePages::load(const Hierarchy& h, uint32_t page) {
-    STIPPLE_CHECK(h.nodes.data() == room_.nodes, "pages of another hierarchy");
-    Loaded loaded;
-    if (h.known.isThere(page)) return loaded;
+/// In order: what is not there yet of the page and of what it builds on, however many levels that is.
+std::set<uint32_t> NodePages::missingFor(const Hierarchy& h, uint32_t page) const {
+    std::set<uint32_t> out;
+    if (!h.known.isThere(page)) out.insert(page);
+    // What is found on the way has lower numbers: it is come to.
+    for (auto at = out.rbegin(); at != out.rend() && *at > 0; ++at) {
+        const uint32_t last = std::min(pageOfParent(placesOf(*at + size_t{1}).nodes - 1), *at - 1);
+        for (uint32_t above = pageOfParent(pages_[*at].first.nodes); above <= last; ++above)
+            if (!h.known.isThere(above)) out.insert(above);
+    }
+    return out;
+}
+
+Result<void> NodePages::loadAlone(const Hierarchy& h, uint32_t page) {
     const Places &first = pages_[page].first, end = placesOf(page + size_t{1});
     STIPPLE_ASSIGN(TablePart part, read(page));
-    loaded = {1, bytesOf(page)};
     for (Node& n : part.nodes)
         if (sourceCode_ != 0 && n.isLeaf()) n.sourceCode = sourceCode_;
-    for (uint32_t above = page == 0 ? 0 : pageOfParent(first.nodes); above < page; ++above) {
-        if (above > pageOfParent(end.nodes - 1)) break;
-        STIPPLE_ASSIGN(const Loaded parents, load(h, above));
-        loaded.pages += parents.pages;
-        loaded.bytes += parents.bytes;
-    }
-    const auto placed = placing_([&]() -> Result<void> {
+    return placing_([&]() -> Result<void> {
         if (h.known.isThere(page)) return {};
         place(part, first);
         STIPPLE_TRY(checkPage(h, first, end, table_.flags, chunksEnd(), file_->path()));
         room_.isThere[page].store(true, std::memory_order_release);
         return {};
     });
-    if (!placed) return tl::unexpected(placed.error());
+}
+
+Result<NodePages::Loaded> NodePages::load(const Hierarchy& h, uint32_t page) {
+    STIPPLE_CHECK(h.nodes.data() == room_.nodes, "pages of another hierarchy");
+    Loaded loaded;
+    for (const uint32_t one : missingFor(h, page)) {
+        STIPPLE_TRY(loadAlone(h, one));
+        loaded.pages += 1;
+        loaded.bytes += bytesOf(one);
+    }
     return loaded;
 }
 

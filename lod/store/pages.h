@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include "engine/base/byte_source.h"
@@ -41,6 +42,9 @@ class NodePages {
   private:
     NodePages() = default;
     Result<void> checkDirectory(const layout::Head& head) const;
+    std::set<uint32_t> missingFor(const Hierarchy& h, uint32_t page) const;
+    /// A page whose nodes' parents are there.
+    Result<void> loadAlone(const Hierarchy& h, uint32_t page);
     Result<TablePart> read(uint32_t page) const;
     /// Into its place.
     void place(const TablePart& part, const layout::Places& first);

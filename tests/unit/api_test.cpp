@@ -346,6 +346,17 @@ TEST_F(Api, MeshesAndScenesInMemoryBuildTheStoreOfTheFile) {
     }
 }
 
+TEST_F(Api, OneWithoutFacesBesideOthersIsNamed) {
+    const std::string ball = bytesOf(writeBall("ball.ply"));
+    const std::string mesh =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n3 0 1 2\n";
+    const auto both = stipple::buildBytes(
+        {{"mesh.ply", mesh.data(), mesh.size()}, {"points.ply", ball.data(), ball.size()}}, at("both.stipple"));
+    ASSERT_FALSE(both);
+    EXPECT_NE(both.error().line().find("points.ply: has no faces"), std::string::npos) << both.error().line();
+}
+
 TEST_F(Api, NamesOfPointsAreNoFiles) {
     // A folder of scans of that name, seen from where the program runs, is another's.
     writeBall("ball.ply");

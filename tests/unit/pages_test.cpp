@@ -448,6 +448,39 @@ TEST_F(StorePages, DirectoriesThatLieAreRefusedBeforeMemoryIsTaken) {
     expectRefused(c, true);
 }
 
+/// Every page builds on the one before: what is read for the last is as deep as there are pages.
+TEST_F(StorePages, AChainOfManyIsReadWithoutDepth) {
+    CraftedPages c(withPages(*points_, folder_ / "ones.stipple", 0));
+    constexpr uint64_t kPages = 200'000;
+    const uint64_t children = c.pages[1].first.children;  // of the root, and itself
+    std::vector<uint8_t> link = c.raw[1], end = link;
+    NodeOnDisk node{};
+    std::memcpy(&node, link.data() + sizeof(PageHead), sizeof(node));
+    node.childMask = 1;
+    std::memcpy(link.data() + sizeof(PageHead), &node, sizeof(node));
+    node.childMask = 0;
+    std::memcpy(end.data() + sizeof(PageHead), &node, sizeof(node));
+    const Places one = c.pages[1].first, two = c.pages[2].first;
+    c.pages.resize(1);
+    c.raw.resize(1);
+    Places at = one;
+    for (uint64_t p = 1; p < kPages; ++p) {
+        c.pages.push_back({{}, at});
+        c.raw.push_back(p + children < kPages + 1 ? link : end);
+        for (uint64_t Places::*field : {&Places::nodes, &Places::further, &Places::streams, &Places::steps})
+            at.*field += two.*field - one.*field;
+        at.children = std::min(at.children + 1, kPages);
+    }
+    c.table.total = at;
+    c.table.pages = c.head.nodeCount = kPages;
+    c.write(folder_ / "chain.stipple");
+    const StorePtr store = opened(folder_ / "chain.stipple", Tables::asNeeded);
+    const auto last = store->pages->load(store->hierarchy, kPages - 1);
+    ASSERT_FALSE(last) << "no octree is as deep";
+    EXPECT_EQ(last.error().kind, ErrorKind::input);
+    EXPECT_TRUE(last.error().line().find("possible") != std::string::npos) << last.error().line();
+}
+
 /// Any bytes of pages and of their directory, seeded: refused, or drawn without harm.
 TEST_F(StorePages, AnyChangedFieldIsRefusedOrDrawn) {
     test::writeMixedStore(folder_ / "mixed.stipple");

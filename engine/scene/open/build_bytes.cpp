@@ -43,14 +43,16 @@ Result<lod::BuildReport> buildPointBytes(const std::vector<Bytes>& inputs, const
 
 /// PLY with faces; all of them, or none is taken for triangles.
 Result<bool> areTriangles(const std::vector<Bytes>& inputs) {
+    const ByteSource* without = nullptr;
     size_t with = 0;
     for (const Bytes& input : inputs) {
         STIPPLE_ASSIGN(const lod::PlyFaces faces, lod::plyFaces(*input));
         with += faces.any() ? 1 : 0;
+        if (!faces.any() && without == nullptr) without = input.get();
     }
-    if (with > 0 && with < inputs.size())
+    if (with > 0 && without != nullptr)
         return fail(ErrorKind::usage, "has no faces, others have: points and triangles are stores of their own",
-                    inputs.front()->path(), "build them apart");
+                    without->path(), "build them apart");
     return with > 0;
 }
 
