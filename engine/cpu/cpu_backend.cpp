@@ -32,7 +32,7 @@ class CpuBackend final : public render::DrawsAtOnce {
         return std::string("cpu ") + frame_.k.name + ", " + std::to_string(frame_.executor.threads()) + " threads";
     }
     Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
-        const lod::Chunk& kept = chunks_.keep(key, std::move(chunk));
+        const lod::Chunk& kept = chunks_.chunks.add(key) = std::move(chunk);
         if (!kept.texels.empty()) {
             if (chunks_.tiles.size() <= key.source) chunks_.tiles.resize(key.source + 1);
             auto& tiles = chunks_.tiles[key.source];
@@ -44,7 +44,7 @@ class CpuBackend final : public render::DrawsAtOnce {
     void evict(streaming::ChunkKey key) override {
         if (key.source < chunks_.tiles.size() && key.chunk < chunks_.tiles[key.source].size())
             chunks_.tiles[key.source][key.chunk] = nullptr;
-        chunks_.drop(key);
+        chunks_.chunks.drop(key, [](lod::Chunk& chunk) { chunk = {}; });
     }
 
     render::BackendResources resources() const override {

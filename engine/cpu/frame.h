@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <memory>
-#include <unordered_map>
 #include <vector>
 
 #include "engine/base/executor.h"
@@ -14,32 +13,16 @@
 #include "engine/cpu/kernels.h"
 #include "engine/cpu/pyramid.h"
 #include "engine/render/backend.h"
+#include "engine/render/chunk_table.h"
 
 namespace stipple::cpu {
 
 /// Resident chunks; `tiles`: of textures, by source and chunk; null: not resident.
 struct Chunks {
-    std::unordered_map<uint64_t, lod::Chunk> chunks;
+    render::ChunkTable<lod::Chunk> chunks;
     std::vector<std::vector<const uint32_t*>> tiles;
-    std::vector<std::unordered_map<uint64_t, lod::Chunk>::node_type> spare;
 
-    static uint64_t idOf(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.chunk; }
-    const lod::Chunk& at(streaming::ChunkKey key) const { return chunks.at(idOf(key)); }
-    /// The table's own memory is used again, so that chunks that come and go allocate nothing once warm.
-    const lod::Chunk& keep(streaming::ChunkKey key, lod::Chunk chunk) {
-        if (spare.empty() || chunks.contains(idOf(key))) return chunks[idOf(key)] = std::move(chunk);
-        auto entry = std::move(spare.back());
-        spare.pop_back();
-        entry.key() = idOf(key);
-        entry.mapped() = std::move(chunk);
-        return chunks.insert(std::move(entry)).position->second;
-    }
-    void drop(streaming::ChunkKey key) {
-        if (auto entry = chunks.extract(idOf(key))) {
-            entry.mapped() = {};
-            spare.push_back(std::move(entry));
-        }
-    }
+    const lod::Chunk& at(streaming::ChunkKey key) const { return chunks.at(key); }
 };
 
 /// The tiles that a disc reaches.

@@ -81,16 +81,19 @@ Result<void> FrameSlot::record(const render::RenderRequest& request, std::vector
 
 Result<void> FrameSlot::recordUploads(PassList& list, std::vector<PendingUpload>& uploads) {
     uint64_t bytes = 0;
-    for (const PendingUpload& p : uploads) bytes += p.bytes.size();
+    for (const PendingUpload& p : uploads) bytes += p.chunk.sizeBytes();
     STIPPLE_TRY(buffers_.prepareStaging(bytes));
     list.beginUpload();
     uint64_t at = 0;
     for (const PendingUpload& p : uploads) {
-        const uint64_t size = p.bytes.size();
-        std::memcpy(static_cast<char*>(buffers_.staging().mapped()) + at, p.bytes.data(), size);
-        const VkBufferCopy region{at, p.offset, size};
+        const uint64_t begin = at;
+        p.chunk.forEachArray([&](const auto& array) {
+            const size_t size = array.size() * sizeof(array[0]);
+            if (size > 0) std::memcpy(static_cast<char*>(buffers_.staging().mapped()) + at, array.data(), size);
+            at += size;
+        });
+        const VkBufferCopy region{begin, p.offset, at - begin};
         vkCmdCopyBuffer(commands_, buffers_.staging().handle(), p.page, 1, &region);
-        at += size;
     }
     list.end();
     return {};

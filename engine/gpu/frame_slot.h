@@ -9,11 +9,11 @@
 
 namespace stipple::gpu {
 
-/// Copies of bytes into pages, before a frame's passes.
+/// A copy of a chunk's arrays into a page, before a frame's passes.
 struct PendingUpload {
     VkBuffer page;
     uint64_t offset;
-    std::vector<uint8_t> bytes;
+    lod::Chunk chunk;
 };
 
 class FrameSlot {

@@ -3,24 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <unordered_map>
 
 #include "engine/gpu/frame_slot.h"
 #include "engine/gpu/pages.h"
+#include "engine/render/chunk_table.h"
 
 namespace stipple::gpu {
 namespace {
 
-uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.chunk; }
-
-std::vector<uint8_t> bytesOfChunk(const lod::Chunk& chunk) {
-    std::vector<uint8_t> bytes;
-    chunk.forEachArray([&](const auto& values) {
-        const auto* from = reinterpret_cast<const uint8_t*>(values.data());
-        bytes.insert(bytes.end(), from, from + values.size() * sizeof(values[0]));
-    });
-    return bytes;
-}
+/// What the host keeps of a chunk that is in the device's memory.
+struct Resident {
+    PageStore::Place place;
+    MeshChunk mesh;
+    std::vector<lod::PatchPlane> planes;  ///< of each patch
+};
 
 class GpuBackend final : public render::Backend {
   public:
@@ -65,40 +61,34 @@ class GpuBackend final : public render::Backend {
 
     Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
         STIPPLE_ASSIGN(const PageStore::Place place, pages_.allocate(chunk.sizeBytes()));
-        places_[chunkId(key)] = place;
-        pending_.push_back({pages_.buffer(place), place.offset, bytesOfChunk(chunk)});
-        if (!chunk.patchBlocks.empty())
-            patchChunks_[chunkId(key)] = lod::planesOfPatches(chunk.patchBlocks, chunk.patchPlanes);
-        if (!chunk.clusters.empty()) {
-            const VkDeviceAddress address = pages_.address(place);
-            meshChunks_[chunkId(key)] = {address, address + chunk.vertices.size() * sizeof(shared::MeshVertex),
-                                         chunk.clusters};
-        }
+        Resident& resident = residents_.add(key);
+        resident.place = place;
+        const VkDeviceAddress address = pages_.address(place);
+        resident.mesh = {address, address + chunk.vertices.size() * sizeof(shared::MeshVertex),
+                         std::move(chunk.clusters)};
+        lod::planesOfPatches(chunk.patchBlocks, chunk.patchPlanes, resident.planes);
+        pending_.push_back({pages_.buffer(place), place.offset, std::move(chunk)});
         return {};
     }
     void evict(streaming::ChunkKey key) override {
-        const auto found = places_.find(chunkId(key));
-        std::erase_if(pending_, [&](const PendingUpload& p) {
-            return p.page == pages_.buffer(found->second) && p.offset == found->second.offset;
+        residents_.drop(key, [&](const Resident& resident) {
+            std::erase_if(pending_, [&](const PendingUpload& p) {
+                return p.page == pages_.buffer(resident.place) && p.offset == resident.place.offset;
+            });
+            pages_.release(resident.place);
         });
-        pages_.release(found->second);
-        places_.erase(found);
-        meshChunks_.erase(chunkId(key));
-        patchChunks_.erase(chunkId(key));
     }
 
     Result<render::Ticket> submit(const render::RenderRequest& request) override {
         STIPPLE_ASSIGN(FrameSlot* const slot, freeSlot());
         if (!request.isOfCasters) pipelines_->begin(request.draws->effects);
         const Residents residents{
-            [&](streaming::ChunkKey key) { return pages_.address(places_.at(chunkId(key))); },
-            [&](streaming::ChunkKey key) -> const MeshChunk& { return meshChunks_.at(chunkId(key)); },
-            [&](streaming::ChunkKey key) -> const std::vector<lod::PatchPlane>& {
-                return patchChunks_.at(chunkId(key));
-            },
+            [&](streaming::ChunkKey key) { return pages_.address(residents_.at(key).place); },
+            [&](streaming::ChunkKey key) -> const MeshChunk& { return residents_.at(key).mesh; },
+            [&](streaming::ChunkKey key) -> const std::vector<lod::PatchPlane>& { return residents_.at(key).planes; },
             [&](uint32_t source, uint32_t chunk) -> VkDeviceAddress {
-                const auto found = places_.find(chunkId({source, chunk}));
-                return found == places_.end() ? 0 : pages_.address(found->second);
+                const Resident* const found = residents_.find({source, chunk});
+                return found == nullptr ? 0 : pages_.address(found->place);
             }};
         STIPPLE_TRY(slot->submit(request, residents, pending_, submitted_ + 1));
         return render::Ticket{++submitted_};
@@ -156,9 +146,7 @@ class GpuBackend final : public render::Backend {
     std::shared_ptr<Device> device_;  // first: everything below is destroyed before it
     std::unique_ptr<Pipelines> pipelines_;
     PageStore pages_;
-    std::unordered_map<uint64_t, PageStore::Place> places_;
-    std::unordered_map<uint64_t, MeshChunk> meshChunks_;
-    std::unordered_map<uint64_t, std::vector<lod::PatchPlane>> patchChunks_;  ///< of each patch
+    render::ChunkTable<Resident> residents_;
     std::vector<PendingUpload> pending_;
     std::vector<std::unique_ptr<FrameSlot>> slots_;
     std::vector<render::PassTime> times_;

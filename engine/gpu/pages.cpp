@@ -8,35 +8,36 @@ constexpr uint64_t kPageBytes = uint64_t{64} << 20, kAlignment = 256;
 }
 
 uint64_t RangeAllocator::allocate(uint64_t bytes) {
-    for (auto it = free_.begin(); it != free_.end(); ++it) {
-        if (it->second < bytes) continue;
-        const auto [offset, size] = *it;
-        free_.erase(it);
-        if (size > bytes) free_[offset + bytes] = size - bytes;
-        return offset;
-    }
-    return ~uint64_t{0};
+    const auto fits = [&](const Range& r) { return r.bytes >= bytes; };
+    const auto range = std::find_if(free_.begin(), free_.end(), fits);
+    if (range == free_.end()) return ~uint64_t{0};
+    const uint64_t offset = range->offset;
+    range->offset += bytes;
+    range->bytes -= bytes;
+    if (range->bytes == 0) free_.erase(range);
+    return offset;
 }
 
 void RangeAllocator::release(uint64_t offset, uint64_t bytes) {
-    auto next = free_.lower_bound(offset);
-    if (next != free_.end() && offset + bytes == next->first) {
-        bytes += next->second;
-        next = free_.erase(next);
+    const auto isBefore = [](const Range& r, uint64_t place) { return r.offset < place; };
+    const auto after = std::lower_bound(free_.begin(), free_.end(), offset, isBefore);
+    const bool joinsAfter = after != free_.end() && offset + bytes == after->offset;
+    const bool joinsBefore = after != free_.begin() && std::prev(after)->offset + std::prev(after)->bytes == offset;
+    if (joinsBefore && joinsAfter) {
+        std::prev(after)->bytes += bytes + after->bytes;
+        free_.erase(after);
+    } else if (joinsBefore) {
+        std::prev(after)->bytes += bytes;
+    } else if (joinsAfter) {
+        *after = {offset, bytes + after->bytes};
+    } else {
+        free_.insert(after, {offset, bytes});
     }
-    if (next != free_.begin()) {
-        const auto before = std::prev(next);
-        if (before->first + before->second == offset) {
-            before->second += bytes;
-            return;
-        }
-    }
-    free_[offset] = bytes;
 }
 
 uint64_t RangeAllocator::freeBytes() const {
     uint64_t sum = 0;
-    for (const auto& [offset, bytes] : free_) sum += bytes;
+    for (const Range& range : free_) sum += range.bytes;
     return sum;
 }
 

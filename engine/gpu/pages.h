@@ -2,17 +2,16 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <vector>
 
 #include "engine/gpu/device.h"
 
 namespace stipple::gpu {
 
-/// Free ranges of one page; pure bookkeeping, tested without a GPU.
+/// Free ranges of one page; pure bookkeeping, tested without a GPU. Once warm it takes no memory of its own.
 class RangeAllocator {
   public:
-    explicit RangeAllocator(uint64_t bytes) { free_[0] = bytes; }
+    explicit RangeAllocator(uint64_t bytes) : free_{{0, bytes}} {}
     /// Offset of a free range of `bytes`, or ~0.
     uint64_t allocate(uint64_t bytes);
     void release(uint64_t offset, uint64_t bytes);
@@ -20,7 +19,10 @@ class RangeAllocator {
     size_t freeRanges() const { return free_.size(); }
 
   private:
-    std::map<uint64_t, uint64_t> free_;  ///< offset -> bytes, never adjacent
+    struct Range {
+        uint64_t offset, bytes;
+    };
+    std::vector<Range> free_;  ///< by offset, never adjacent
 };
 
 class PageStore {

@@ -64,12 +64,11 @@ PatchBlocks blocksOf(std::span<const Patch> patches) {
     return out;
 }
 
-std::vector<PatchPlane> planesOfPatches(std::span<const shared::PatchBlock> blocks,
-                                        std::span<const PatchPlane> planes) {
-    std::vector<PatchPlane> out;
+void planesOfPatches(std::span<const shared::PatchBlock> blocks, std::span<const PatchPlane> planes,
+                     std::vector<PatchPlane>& out) {
+    out.clear();
     for (size_t b = 0; b < blocks.size(); ++b)
         if (blocks[b].number >= out.size()) out.resize(blocks[b].number + 1, planes[b]);
-    return out;
 }
 
 uint32_t countBlocks(const Patch& patch) {

@@ -24,8 +24,9 @@ struct PatchBlocks {
     std::vector<uint32_t> maps;      ///< words that PatchBlock::map points into
 };
 
-/// Of each patch that has a number among the blocks, from those of the blocks.
-std::vector<PatchPlane> planesOfPatches(std::span<const shared::PatchBlock> blocks, std::span<const PatchPlane> planes);
+/// Of each patch that has a number among the blocks, from those of the blocks; into `out`, whose memory is used again.
+void planesOfPatches(std::span<const shared::PatchBlock> blocks, std::span<const PatchPlane> planes,
+                     std::vector<PatchPlane>& out);
 
 /// Blocks of one patch; `number`: its place among those of its chunk. Above colours stand numbers of materials.
 PatchBlocks blocksOf(const Patch& patch, uint32_t number = 0);

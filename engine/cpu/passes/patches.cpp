@@ -12,7 +12,8 @@ void findBlocks(Frame& frame) {
     std::vector<uint32_t> first;  // of the placed patches, by node
     const auto planesOf = [&](streaming::ChunkKey key) -> const std::vector<lod::PatchPlane>& {
         const lod::Chunk& chunk = frame.chunks.at(key);
-        return planes = lod::planesOfPatches(chunk.patchBlocks, chunk.patchPlanes);
+        lod::planesOfPatches(chunk.patchBlocks, chunk.patchPlanes, planes);
+        return planes;
     };
     render::placePatches(*frame.draws, planesOf, frame.patches, first);
     frame.patchBlocks.resize(batch.blocks.size());
