@@ -30,7 +30,7 @@ Result<std::string> programPath() {
     for (const std::string& place : places)
         if (fs::is_regular_file(place, ignored)) return place;
     return fail(ErrorKind::input, "the program that reads OpenVDB files is not there", places.front(),
-                "install stipple anew, with the packages that it names");
+                "build the target stipple_vdb, or install stipple anew");
 }
 
 /// All that it says, until it closes its end; killed where a stop is asked for.
