@@ -90,13 +90,16 @@ class CpuBackend final : public render::DrawsAtOnce {
             const double start = nowSeconds();
             std::string name = render::passName(passes[p]);
             size_t next = p + 1;
+            const bool isWithRows = passes[p] == render::Pass::resolve && !frame_.hasPyramid;
+            if (isWithRows) name += std::string("+") + render::passName(passes[next++]);
             frame_.effectAtWork = render::effectOfPass(passes[p]).value_or(0);
-            if (const CpuPass& pass = cpuPassOf(passes[p]); pass.run != nullptr) {
+            if (const CpuPass& pass = cpuPassOf(passes[p]); pass.run != nullptr && !isWithRows) {
                 pass.run(frame_);
             } else {
                 for (; next < passes.size() && joinsRows(passes[next]); ++next)
                     name += std::string("+") + render::passName(passes[next]);
-                runRows(frame_, passes.subspan(p, next - p), passes.subspan(next));
+                const size_t first = isWithRows ? p + 1 : p;
+                runRows(frame_, passes.subspan(first, next - first), passes.subspan(next));
             }
             times_.push_back({name, (nowSeconds() - start) * 1e3});
             p = next;

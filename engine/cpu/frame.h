@@ -90,11 +90,18 @@ struct Frame {
     std::unique_ptr<uint32_t, void (*)(void*)> secondPlaces{nullptr, std::free};
     std::vector<uint8_t> secondKinds, secondRuns;
 
-    Pyramid pyramid;             ///< Plane::texels and Plane::coarse; Plane::smooth where there is one, and then ...
-    Level pixels;                ///< ... Plane::texels
+    Pyramid pyramid;  ///< Plane::texels and Plane::coarse, or Plane::smooth; without one texels never leave the cache
     HugeBuffer<uint8_t> smooth;  ///< 1: shows a point of a node that is kNodeSmooth; only where there are some
     size_t smoothPixels = 0;
-    Level& texels() { return hasSmooth && !isSmoothing ? pixels : pyramid.level(0); }
+    /// Without a pyramid: 1 where the row of a tile shows something, all tiles of a row side by side.
+    std::vector<uint8_t> shownRows;
+    uint8_t& shownRow(uint32_t x0, uint32_t y) {
+        return shownRows[size_t{y} * ((constants.width + kTile - 1) / kTile) + x0 / kTile];
+    }
+    /// Of a row of a tile, once it is resolved.
+    bool mayShow(uint32_t x0, uint32_t y, uint32_t n) {
+        return hasPyramid ? pyramid.level(0).mayHold(y, x0, n) : shownRow(x0, y) != 0;
+    }
     // Of the pixels of triangles, beside their texels.
     HugeBuffer<uint32_t> surface, emissive;
     size_t surfacePixels = 0, emissivePixels = 0;

@@ -30,6 +30,8 @@ namespace stipple::cpu {
 constexpr uint32_t kTile = 128;  ///< pixels of a row that are worked on together: all rows of a tile stay in L1 and L2
 constexpr uint32_t kPad = 16;    ///< entries in front of the first one; also room behind the last one
 
+constexpr uint32_t kTexelGroup = 16;  ///< texels of a row that are made or left out together
+
 constexpr uint32_t kWidePixel = ~1u;  ///< in the place of a pixel's index: a wide disc
 
 /// A row of unpacked texels; entry x of a tile is at [kPad + x]. Entries -1 and n may be read as neighbours.
@@ -46,6 +48,7 @@ struct TexelRow {
     alignas(64) float slopeX[kSize], slopeY[kSize], inverseDepth[kSize];
     bool hasTubes;  ///< or narrow ribbons
     bool hasMaterials;
+    bool isRounded;  ///< to pack and unpack it would change nothing
 };
 
 /// A coarse row at the resolution of the fine one: for each fine texel its parent, and the parent's neighbour on the
@@ -190,6 +193,8 @@ struct Tables {
     std::array<float, 256> radiusFraction;
     std::array<uint32_t, 256> red, green, blue;  ///< sRGB byte -> its bits of the packed colour
     std::array<uint32_t, 2048> srgbByte;         ///< sqrt(linear) * 2047 -> sRGB byte
+    /// sRGB byte of a point that is not lit -> its bits of the picture's pixel, which is opaque.
+    std::array<uint32_t, 256> shownRed, shownGreen, shownBlue;
 };
 
 Tables makeTables();
@@ -245,7 +250,9 @@ struct ResolveInput {
     const shared::WideDisc* discs;
     const shared::DiscBox* discBoxes;  ///< of each
     size_t discCount;
-    bool exactPoints;  ///< points are what their pixels show, at the depth of the visibility buffer
+    bool exactPoints;   ///< points are what their pixels show, at the depth of the visibility buffer
+    bool needsDepths;   ///< else nobody asks more of those than whether there is one
+    bool roundsPoints;  ///< rows of nothing but such points are rounded as packed ones are (TexelRow::isRounded)
     const shared::FilteredPixel* filtered;  ///< of the image: what they show there; null: that of their records
     SecondPixels seconds;
     const Frame* frame;         ///< for ...
@@ -319,6 +326,9 @@ struct ShadeOutput {
     float *depth, *normal, *linear;  ///< may be null
 };
 
+/// What a row of pixels shows.
+enum class RowContent { nothing, points, other };
+
 /// Compiled once for views in perspective and once for orthographic ones, which `orthographic` leads to.
 struct Kernels {
     const char* name;
@@ -334,14 +344,22 @@ struct Kernels {
     bool (*resolveRow)(const shared::FrameConstants& f, const Tables& tables, const ResolveInput& in,
                        uint64_t* visibility, uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius,
                        const SurfacePlanes& planes);
-    void (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
-    void (*unpackRow)(const Planes& from, uint32_t first, uint32_t n, TexelRow& row);
+    /// The same and all passes after it, where points show their own colours and nobody asks for more: their pixels of
+    /// the picture. Does nothing if the row shows something else (with
+    /// `tellsSmooth` points of smooth nodes, too), or nothing. `nothing`: a pixel without points.
+    RowContent (*showPoints)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks,
+                             bool tellsSmooth, uint64_t* visibility, uint32_t n, uint32_t nothing, uint32_t* rgba);
+    /// Groups (kTexelGroup) of texels of which some are there: of the others nothing is written. A bit each.
+    uint32_t (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
+    /// `held`: those groups; others become empty, and nothing of them is read. `to`: entry of the first in the row.
+    void (*unpackRow)(const Planes& from, uint32_t to, uint32_t n, uint32_t held, TexelRow& row);
     void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float focal,
                     TexelRow& out);
     /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy. (x, y): centre of the row's
-    /// first texel, px from the principal point.
+    /// first texel, px from the principal point. `wanted`: groups of texels (kTexelGroup), a bit each; others are
+    /// empty.
     void (*pushRow)(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, float x,
-                    float y, uint32_t n, float fineSize, float focal, TexelRow& out);
+                    float y, uint32_t n, uint32_t wanted, float fineSize, float focal, TexelRow& out);
     /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x, with their discs (coarseDisc). (x, y): centre
     /// of the coarse row's first texel, px from the principal point; `size`: edge of its texels, px.
     void (*expandRow)(TexelRow& coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,

@@ -169,6 +169,32 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/ewa.inl"
 
+/// Of the groups of kTexelGroup texels of a row, those in which one of the rows holds any: a bit each.
+template <typename... Depths>
+[[gnu::always_inline]] inline uint32_t groupsHeld(uint32_t n, const Depths* __restrict... depths) {
+    uint32_t held = 0, rest = 0;
+    const uint32_t whole = n / kTexelGroup;
+    for (uint32_t group = 0; group < whole; ++group) {
+        uint32_t any = 0;
+        for (size_t i = 0; i < kTexelGroup; ++i)
+            any |= ((depths[group * kTexelGroup + i] > 0.0f ? 1u : 0u) | ...);
+        held |= any << group;
+    }
+    for (size_t i = size_t{whole} * kTexelGroup; i < n; ++i) rest |= ((depths[i] > 0.0f ? 1u : 0u) | ...);
+    return held | rest << whole;
+}
+/// Calls use(first, last) for groups side by side: what is the same for all texels is read once for all of them.
+template <typename Use>
+[[gnu::always_inline]] inline void forGroups(uint32_t groups, uint32_t n, const Use& use) {
+    while (groups != 0u) {
+        const auto first = uint32_t(__builtin_ctz(groups));
+        const auto count = uint32_t(__builtin_ctz(~(groups >> first)));
+        const uint32_t last = (first + count) * kTexelGroup;
+        use(size_t{first} * kTexelGroup, size_t{last < n ? last : n});
+        groups &= ~0u << (first + count);
+    }
+}
+
 #include "engine/cpu/resolve_points.inl"
 
 /// Calls use<hasTubes, hasMaterials>().
@@ -185,12 +211,13 @@ template <typename Use>
 }
 
 template <bool hasTubes, bool hasMaterials>
-[[gnu::always_inline]] inline void packTexels(const TexelRow& __restrict row, uint32_t n, const Planes& planes) {
+[[gnu::always_inline]] inline void packTexels(const TexelRow& __restrict row, size_t first, size_t last,
+                                              const Planes& planes) {
     float* __restrict const depth = planes.depth;
     uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset, *__restrict const normal = planes.normal,
              *__restrict const colour = planes.colour, *__restrict const surface = planes.surface;
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
+    for (size_t i = first; i < last; ++i) {
         const Texel t = texelAt<hasTubes, hasMaterials>(row, kPad + i);
         if (hasMaterials) surface[i] = packSurface(t.surface);
         const PackedTexel p = hasTubes ? packAnyTexel(t) : packTexel(t);
@@ -201,20 +228,25 @@ template <bool hasTubes, bool hasMaterials>
         colour[i] = p.colour;
     }
 }
-void packRow(const TexelRow& row, uint32_t n, const Planes& planes) {
-    forRow(row.hasTubes, row.hasMaterials,
-           [&]<bool hasTubes, bool hasMaterials>() { packTexels<hasTubes, hasMaterials>(row, n, planes); });
+uint32_t packRow(const TexelRow& row, uint32_t n, const Planes& planes) {
+    const uint32_t held = groupsHeld(n, row.depth + kPad);
+    forRow(row.hasTubes, row.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
+        forGroups(held, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+            packTexels<hasTubes, hasMaterials>(row, first, last, planes);
+        });
+    });
+    return held;
 }
 
 template <bool hasTubes, bool hasMaterials>
-[[gnu::always_inline]] inline void unpackTexels(const Planes& planes, uint32_t first, uint32_t n,
+[[gnu::always_inline]] inline void unpackTexels(const Planes& planes, uint32_t to, size_t first, size_t last,
                                                 TexelRow& __restrict row) {
     const float* __restrict const depth = planes.depth;
     const uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset,
                    *__restrict const normal = planes.normal, *__restrict const colour = planes.colour,
                    *__restrict const surface = planes.surface;
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
+    for (size_t i = first; i < last; ++i) {
         PackedTexel p;
         p.depth = depth[i];
         p.size = size[i];
@@ -223,20 +255,27 @@ template <bool hasTubes, bool hasMaterials>
         p.colour = colour[i];
         Texel t = hasTubes ? unpackAnyTexel(p) : unpackTexel(p);
         if (hasMaterials) t.surface = unpackSurface(surface[i]);
-        setTexel<hasTubes, hasMaterials>(row, first + i, t);
+        setTexel<hasTubes, hasMaterials>(row, to + i, t);
     }
 }
-void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& row) {
-    forRow(row.hasTubes, row.hasMaterials,
-           [&]<bool hasTubes, bool hasMaterials>() { unpackTexels<hasTubes, hasMaterials>(planes, first, n, row); });
+void unpackRow(const Planes& planes, uint32_t to, uint32_t n, uint32_t held, TexelRow& row) {
+    const uint32_t all = ~0u >> (32u - (n + kTexelGroup - 1u) / kTexelGroup);
+    if ((held & all) != all)
+        for (size_t i = 0; i < n; ++i) row.depth[to + i] = 0.0f;
+    forRow(row.hasTubes, row.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
+        forGroups(held & all, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+            unpackTexels<hasTubes, hasMaterials>(planes, to, first, last, row);
+        });
+    });
 }
 
 template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline void pullTexelRow(const TexelRow& __restrict upper, const TexelRow& __restrict lower,
-                                                uint32_t n, float childSize, float focal, TexelRow& __restrict out) {
+                                                size_t first, size_t last, float childSize, float focal,
+                                                TexelRow& __restrict out) {
     const Lens lens = lensHere(focal);
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
+    for (size_t i = first; i < last; ++i) {
         const size_t a = kPad + 2 * i, b = a + 1;
         const auto at = [](const TexelRow& row, size_t k) { return texelAt<hasTubes, hasMaterials>(row, k); };
         setTexel<hasTubes, hasMaterials>(
@@ -244,8 +283,16 @@ template <bool hasTubes, bool hasMaterials>
     }
 }
 void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float focal, TexelRow& out) {
+    static_assert(2 * kTile / kTexelGroup < 32);
+    uint32_t held = groupsHeld(2 * n, upper.depth + kPad, lower.depth + kPad);
+    held |= held >> 1;  // two groups become one
+    uint32_t made = 0;
+    for (uint32_t group = 0; group * kTexelGroup < n; ++group) made |= (held >> 2 * group & 1u) << group;
+    for (size_t i = 0; i < n; ++i) out.depth[kPad + i] = 0.0f;
     forRow(out.hasTubes, out.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
-        pullTexelRow<hasTubes, hasMaterials>(upper, lower, n, childSize, focal, out);
+        forGroups(made, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+            pullTexelRow<hasTubes, hasMaterials>(upper, lower, first, last, childSize, focal, out);
+        });
     });
 }
 
@@ -317,10 +364,11 @@ void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float 
 template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline void pushTexelRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow,
                                                 const ExpandedRow& __restrict farRow, float sy, float x, float y,
-                                                uint32_t n, float fineSize, float focal, TexelRow& __restrict out) {
+                                                size_t first, size_t last, float fineSize, float focal,
+                                                TexelRow& __restrict out) {
     const Lens lens = lensHere(focal);
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
+    for (size_t i = first; i < last; ++i) {
         const size_t at = kPad + i;
         const float sx = float(int(i & 1u) * 2 - 1);
         const auto of = [at](const TexelRow& row) { return texelAt<hasTubes, hasMaterials>(row, at); };
@@ -331,10 +379,18 @@ template <bool hasTubes, bool hasMaterials>
                       discAt(farRow.beside, at), sx, sy, x + float(int(i)) * fineSize, y, fineSize, lens));
     }
 }
+
 void pushRow(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, float x, float y,
-             uint32_t n, float fineSize, float focal, TexelRow& out) {
+             uint32_t n, uint32_t wanted, float fineSize, float focal, TexelRow& out) {
+    static_assert(kTile % kTexelGroup == 0 && kTile / kTexelGroup < 32);
+    const auto at = [](const TexelRow& row) { return row.depth + kPad; };
+    const uint32_t held =
+        wanted & groupsHeld(n, at(fine), at(nearRow.nearest), at(nearRow.beside), at(farRow.nearest), at(farRow.beside));
+    for (size_t i = 0; i < n; ++i) out.depth[kPad + i] = 0.0f;
     forRow(out.hasTubes, out.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
-        pushTexelRow<hasTubes, hasMaterials>(fine, nearRow, farRow, sy, x, y, n, fineSize, focal, out);
+        forGroups(held, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+            pushTexelRow<hasTubes, hasMaterials>(fine, nearRow, farRow, sy, x, y, first, last, fineSize, focal, out);
+        });
     });
 }
 
@@ -370,6 +426,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               &STIPPLE_KERNELS_ORTHOGRAPHIC,
                               projectBlock,
                               resolveRow,
+                              showPoints,
                               packRow,
                               unpackRow,
                               pullRow,

@@ -23,17 +23,13 @@ class Level {
         perRow_ = (w + kSegment - 1) / kSegment;
         filled_.assign(size_t{perRow_} * h, 0);
     }
-    /// The same, unless it is so already.
-    void fit(uint32_t w, uint32_t h, bool hasMaterials) {
-        if (w != width || h != height || hasMaterials != hasMaterials_) resize(w, h, hasMaterials);
-    }
     Planes planes() {
         const size_t n = size_t{width} * height;
         uint32_t* p = words_.data();
         return {reinterpret_cast<float*>(p),        p + n, p + 2 * n, p + 3 * n, p + 4 * n,
                 hasMaterials_ ? p + 5 * n : nullptr};
     }
-    /// May any of these texels of a row be there? If not, all their depths are 0 in memory.
+    /// May any of these texels of a row be there?
     bool mayHold(uint32_t y, uint32_t x, uint32_t n) const {
         const uint8_t* const row = filled_.data() + size_t{y} * perRow_;
         bool any = false;
@@ -53,26 +49,36 @@ class Level {
                        bottom = std::min((row1 + 1) / 2 + beside, height);
         return mayHoldTile(left, right - left, top, bottom);
     }
-    /// They may from now on. `x`: a multiple of kSegment.
-    void hold(uint32_t y, uint32_t x, uint32_t n) { set(y, x, n, 1); }
+    /// Which groups (kTexelGroup) of these texels hold any, a bit each. `x`: a multiple of kSegment; up to a tile.
+    uint32_t held(uint32_t y, uint32_t x, uint32_t n) const {
+        const uint8_t* const at = filled_.data() + size_t{y} * perRow_ + x / kSegment;
+        return n <= kSegment ? at[0] : at[0] | uint32_t{at[1]} << kSegmentGroups;
+    }
+    /// It is these from now on, of which the planes hold all; depths of those that held some before become 0.
+    void hold(uint32_t y, uint32_t x, uint32_t n, uint32_t groups) {
+        uint8_t* const at = filled_.data() + size_t{y} * perRow_ + x / kSegment;
+        const uint32_t gone = held(y, x, n) & ~groups;
+        float* const depth = planes().depth + size_t{y} * width + x;
+        for (uint32_t g = 0; gone >> g != 0; ++g)
+            if ((gone >> g & 1u) != 0)
+                std::fill_n(depth + g * kTexelGroup, std::min(kTexelGroup, n - g * kTexelGroup), 0.0f);
+        at[0] = static_cast<uint8_t>(groups & kSegmentMask);
+        if (n > kSegment) at[1] = static_cast<uint8_t>(groups >> kSegmentGroups);
+    }
     /// None is there.
     void empty(uint32_t y, uint32_t x, uint32_t n) {
-        if (!mayHold(y, x, n)) return;
-        std::fill_n(planes().depth + size_t{y} * width + x, n, 0.0f);
-        set(y, x, n, 0);
+        if (mayHold(y, x, n)) hold(y, x, n, 0);
     }
 
   private:
-    /// Texels of a segment: half a tile, so that what two tiles are merged to is no segment of both.
-    static constexpr uint32_t kSegment = kTile / 2;
-    void set(uint32_t y, uint32_t x, uint32_t n, uint8_t value) {
-        uint8_t* const row = filled_.data() + size_t{y} * perRow_;
-        for (uint32_t s = x / kSegment; s <= (x + n - 1) / kSegment; ++s) row[s] = value;
-    }
+    /// Texels of a segment, whose groups share a byte: half a tile, so that what two tiles are merged to is no segment
+    /// of both.
+    static constexpr uint32_t kSegment = kTile / 2, kSegmentGroups = kSegment / kTexelGroup,
+                              kSegmentMask = (1u << kSegmentGroups) - 1;
     HugeBuffer<uint32_t> words_;
     uint32_t perRow_ = 0;
     bool hasMaterials_ = false;
-    std::vector<uint8_t> filled_;
+    std::vector<uint8_t> filled_;  ///< of each segment its groups: depths of those that hold none are 0 in memory
 };
 
 }  // namespace stipple::cpu

@@ -26,10 +26,9 @@ void Pyramid::pullPair(const TexelRow& upper, const TexelRow& lower, bool any, u
         to.empty(y, x, n);
         return;
     }
-    to.hold(y, x, n);
     out.hasTubes = upper.hasTubes || lower.hasTubes;
     k_.pullRow(upper, lower, n, childSize, frame_.focal, out);
-    k_.packRow(out, n, to.planes().at(size_t{y} * to.width + x));
+    to.hold(y, x, n, k_.packRow(out, n, to.planes().at(size_t{y} * to.width + x)));
 }
 
 void Pyramid::pull() {
@@ -45,7 +44,7 @@ void Pyramid::pull() {
                 bool any = false;
                 for (TexelRow* row : {&upper, &lower}) {
                     const uint32_t yy = y + (row == &lower ? 1 : 0);
-                    any = (yy < row1 && loadRow(fine, from, yy, x0, n, kPad, *row)) || any;
+                    any = (yy < row1 && loadRow(fine, from, yy, x0, n, *row)) || any;
                     if (yy >= row1) std::fill_n(row->depth + kPad, n, 0.0f);
                     row->depth[kPad + n] = 0;
                 }
@@ -55,35 +54,42 @@ void Pyramid::pull() {
     }
 }
 
-bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, uint32_t first,
+bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n,
                       TexelRow& row) const {
-    const Planes at = planes.at(size_t{y} * level.width + x);
-    const bool mayHold = level.mayHold(y, x, n);
-    uint32_t anyThere = 0, signs = 0;
-    for (uint32_t i = 0; mayHold && i < n; ++i) anyThere |= at.depth[i] > 0 ? 1u : 0u;
-    for (uint32_t i = 0; hasCurves_ && anyThere != 0 && i < n; ++i) signs |= at.depth[i] > 0 ? at.size[i] : 0u;
-    const bool any = anyThere != 0;
+    return loadTexels(planes.at(size_t{y} * level.width + x), level.held(y, x, n), kPad, n, row);
+}
+
+bool Pyramid::loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, TexelRow& row) const {
+    uint32_t signs = 0;
+    for (uint32_t g = 0; hasCurves_ && held >> g != 0; ++g)
+        for (uint32_t i = g * kTexelGroup; (held >> g & 1u) != 0 && i < std::min(n, (g + 1) * kTexelGroup); ++i)
+            signs |= at.depth[i] > 0 ? at.size[i] : 0u;
     row.hasTubes = (signs & 0x80008000u) != 0;
-    if (any)
-        k_.unpackRow(at, first, n, row);
-    else
-        std::fill_n(row.depth + first, n, 0.0f);
+    k_.unpackRow(at, to, n, held, row);
     if (hasCurves_ && !row.hasTubes) {  // others beside it may have some
-        std::fill_n(row.isRound + first, n, 0.0f);
-        std::fill_n(row.axisX + first, n, 0.0f);
+        std::fill_n(row.isRound + to, n, 0.0f);
+        std::fill_n(row.axisX + to, n, 0.0f);
     }
-    return any;
+    return held != 0;
 }
 
 bool Pyramid::loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
                          TexelRow& scratch, ExpandedRow& out) const {
     const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
     if (y < 0 || y >= static_cast<int>(level.height)) return false;
-    const uint32_t before = c0 > 0 ? 1 : 0, after = c0 + count < level.width ? 1 : 0;
-    scratch.depth[kPad - 1] = kOutside;  // overwritten below where there is a neighbour
-    scratch.depth[kPad + count] = kOutside;
-    if (!loadRow(level, planes, static_cast<uint32_t>(y), c0 - before, count + before + after, kPad - before, scratch))
-        return false;
+    const auto line = static_cast<uint32_t>(y);
+    const auto at = [&](uint32_t x) { return planes.at(size_t{line} * level.width + x); };
+    bool any = loadRow(level, planes, line, c0, count, scratch), hasTubes = scratch.hasTubes;
+    const auto loadBeside = [&](bool isInside, uint32_t x, uint32_t to) {
+        scratch.depth[to] = isInside ? 0 : kOutside;
+        if (!isInside || !level.mayHold(line, x, 1) || !(*at(x).depth > 0)) return;
+        any = loadTexels(at(x), 1, to, 1, scratch);
+        hasTubes = hasTubes || scratch.hasTubes;
+    };
+    loadBeside(c0 > 0, c0 - 1, kPad - 1);
+    loadBeside(c0 + count < level.width, c0 + count, kPad + count);
+    if (!any) return false;
+    scratch.hasTubes = hasTubes;
     k_.expandRow(scratch, n, (static_cast<float>(c0) + 0.5f) * size - frame_.centre.x,
                  (static_cast<float>(y) + 0.5f) * size - frame_.centre.y, size, frame_.focal, out.nearest, out.beside);
     out.nearest.hasTubes = scratch.hasTubes;
@@ -99,12 +105,12 @@ void Pyramid::push() {
         const Planes planes = fine.planes();
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (!fine.mayHoldTile(x0, n, row0, row1) && !coarse.mayHoldParents(x0, n, row0, row1, true)) return;
-            pushTile(fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1,
-                     [&](uint32_t y, const TexelRow&, const TexelRow& row, bool any) {
-                         if (!any) return;
-                         fine.hold(y, x0, n);
-                         k_.packRow(row, n, planes.at(size_t{y} * fine.width + x0));
-                     });
+            pushTile(
+                fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1, [](uint32_t) { return ~0u; },
+                [&](uint32_t y, const TexelRow&, const TexelRow& row, bool any) {
+                    if (!any) return;
+                    fine.hold(y, x0, n, k_.packRow(row, n, planes.at(size_t{y} * fine.width + x0)));
+                });
         });
     }
 }

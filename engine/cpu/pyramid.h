@@ -14,6 +14,7 @@ namespace stipple::cpu {
 
 constexpr float kOutside = -1;      ///< depth of a texel outside the image
 constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
+constexpr uint32_t kTileRows = 2 * kBandRows;
 
 class Pyramid {
   public:
@@ -60,37 +61,44 @@ class Pyramid {
     void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, Level& to,
                   uint32_t x, uint32_t y, TexelRow& out);
     /// Unpacks n texels of a row; false (and only the depths set) if all are empty.
-    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, uint32_t first,
-                 TexelRow& row) const;
+    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, TexelRow& row) const;
 
     /// Pushes coarse into fine over one tile, row by row: use(y, own row, pushed row, any).
-    template <typename Use>
+    /// wanted(y): groups of texels (kTexelGroup) that are, a bit each; of rows without any nothing is loaded, and `any`
+    /// is false.
+    template <typename Wanted, typename Use>
     void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1,
-                  const Use& use) {
+                  const Wanted& wanted, const Use& use) {
         const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
         thread_local TexelRow scratch{}, own{}, out{};
         thread_local std::array<ExpandedRow, 3> ring{};
         scratch.hasTubes = own.hasTubes = out.hasTubes = hasCurves_;
         scratch.hasMaterials = own.hasMaterials = out.hasMaterials = hasMaterials_;
         std::array<bool, 3> has{};
-        const int c0 = static_cast<int>(row0 / 2);
-        for (int c = c0 - 1; c <= c0; ++c)
-            has.at(static_cast<size_t>(c + 1) % 3) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, c, x0, n, scratch,
-                                                                ring.at(static_cast<size_t>(c + 1) % 3));
+        std::array<int, 3> held{-2, -2, -2};
+        const auto slotOf = [&](int c) {  // of coarse row c, which is there from here on
+            const auto slot = static_cast<size_t>(c + 1) % 3;
+            if (held.at(slot) != c)
+                has.at(slot) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, c, x0, n, scratch, ring.at(slot));
+            held.at(slot) = c;
+            return slot;
+        };
         for (uint32_t y = row0; y < row1; ++y) {
-            const auto c = static_cast<size_t>(y / 2);  // ring slot of coarse row c is (c + 1) % 3
-            if (y % 2 == 0)
-                has.at((c + 2) % 3) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, static_cast<int>(c) + 1, x0, n,
-                                                 scratch, ring.at((c + 2) % 3));
-            const size_t nearSlot = (c + 1) % 3, farSlot = y % 2 == 0 ? c % 3 : (c + 2) % 3;
-            const bool ownAny = loadRow(fine, finePlanes, y, x0, n, kPad, own);
+            const uint32_t groups = wanted(y);
+            if (groups == 0) {
+                use(y, own, own, false);
+                continue;
+            }
+            const auto c = static_cast<int>(y / 2), beyond = y % 2 == 0 ? c - 1 : c + 1;
+            const size_t nearSlot = slotOf(c), farSlot = slotOf(beyond);
+            const bool ownAny = loadRow(fine, finePlanes, y, x0, n, own);
             if (!has.at(nearSlot) && !has.at(farSlot)) {
                 use(y, own, own, ownAny);
                 continue;
             }
             for (const size_t slot : {nearSlot, farSlot}) {
                 if (has.at(slot)) continue;
-                const bool isOutside = slot == farSlot && (y % 2 == 0 ? c == 0 : c + 1 >= coarse.height);
+                const bool isOutside = slot == farSlot && (beyond < 0 || beyond >= static_cast<int>(coarse.height));
                 std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
                 std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
             }
@@ -98,12 +106,15 @@ class Pyramid {
                            (has.at(farSlot) && ring.at(farSlot).nearest.hasTubes);
             k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f,
                        (static_cast<float>(x0) + 0.5f) * fineSize - frame_.centre.x,
-                       (static_cast<float>(y) + 0.5f) * fineSize - frame_.centre.y, n, fineSize, frame_.focal, out);
+                       (static_cast<float>(y) + 0.5f) * fineSize - frame_.centre.y, n, groups, fineSize, frame_.focal,
+                       out);
             use(y, own, out, true);
         }
     }
 
   private:
+    /// The same of texels at hand; `held`: groups of them.
+    bool loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, TexelRow& row) const;
     /// The expanded coarse row `y` around the fine columns [x0, x0 + n); empty outside the level.
     bool loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
                     TexelRow& scratch, ExpandedRow& out) const;

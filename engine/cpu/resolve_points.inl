@@ -9,6 +9,16 @@ struct Gathered {
     alignas(64) float turned[kTile], nx[kTile], ny[kTile], nz[kTile];
     alignas(64) float front[kTile];  // depth by which each was the nearest
     alignas(64) uint8_t smooth[kTile];
+    // Where records have been read, and of what node; null: no point is shown.
+    const PointRecord* record[kTile];
+    const DrawNode* node[kTile];
+};
+
+/// What the points of a row are: flags and masks of all of them.
+struct GatheredKinds {
+    bool any = false;
+    uint32_t flags = 0, octantMasks = 0;
+    bool isTurned() const { return (octantMasks & kNodeTurned) != 0u; }
 };
 
 /// Camera-space normals of the points that were gathered, any side. `anyTurned`: of instances that are not turned the
@@ -37,13 +47,13 @@ template <bool anyTurned>
 /// Texels of the points that were gathered.
 template <bool anyTurned>
 [[gnu::always_inline]] inline void resolveSplats(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
-                                                 uint32_t n, TexelRow& __restrict row) {
+                                                 size_t first, size_t last, TexelRow& __restrict row) {
     const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
     const Lens lens = lensHere(focal);
     const float mostScattered = largestSplat(kFlagScattered, focal, f.height), most = largestSplat(0u, focal, f.height);
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
+    for (size_t i = first; i < last; ++i) {
         const bool valid = g.z[i] > 0.0f;
         const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
         const vec3 nc = gatheredNormal<anyTurned>(f, g, i, c);
@@ -60,43 +70,59 @@ template <bool anyTurned>
     }
 }
 
-/// The same where every pixel that a disc covers is its own: no splats, but what the pixels show. `isBlended`: of more
-/// than one disc.
-template <bool anyTurned>
-[[gnu::always_inline]] inline void resolveExact(const FrameConstants& f, const Gathered& g, bool isBlended, uint32_t x0,
-                                                uint32_t y, uint32_t n, TexelRow& __restrict row) {
+/// The same where every pixel that a disc covers is its own: no splats, but what the pixels show. `hasPlaces`: places
+/// have been gathered; else all have normals, and of their depths nobody asks more than whether there is one, or they
+/// are blended of more than one disc. `isRounded`: as packed texels are.
+template <bool anyTurned, bool hasPlaces, bool isRounded>
+[[gnu::always_inline]] inline void resolveExact(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
+                                                uint32_t n, TexelRow& __restrict row) {
     const float focal = f.focal, support = f.supportScale,
-                mostScattered = largestSplat(kFlagScattered, focal, f.height), anywhere = isBlended ? 3.0e38f : 0.0f;
+                mostScattered = largestSplat(kFlagScattered, focal, f.height);
     const Lens lens = lensHere(focal);
     const float x = float(int(x0)) + 0.5f - f.centre.x, py = float(int(y)) + 0.5f - f.centre.y;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const bool valid = g.front[i] > 0.0f;
-        const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
+        const bool isPlaced = hasPlaces & valid;
+        const vec3 c = vec3(isPlaced ? g.x[i] : 0.0f, isPlaced ? g.y[i] : 0.0f, isPlaced ? g.z[i] : 1.0f);
         const vec3 nc = gatheredNormal<anyTurned>(f, g, i, c);
         const vec3 v = viewDirection(x + float(int(i)), py, lensHere(focal));
         const float flip = dot(nc, v) > 0.0f ? -1.0f : 1.0f;
         const vec2 perp = perpFromNormal(nc, v);
         Texel t;
-        const float cap = (g.flags[i] & kFlagScattered) != 0u ? lensDepth(lens, c.z) * mostScattered : 3.0e38f;
-        const float shown = shownDepth({c, nc, min(g.radius[i] * support, cap), 0u}, g.front[i]);
-        t.depth = valid ? min(g.front[i], max(shown, anywhere)) : 0.0f;
+        float depth = g.front[i];
+        if (hasPlaces) {
+            const float cap = (g.flags[i] & kFlagScattered) != 0u ? lensDepth(lens, c.z) * mostScattered : 3.0e38f;
+            const float shown = shownDepth({c, nc, min(g.radius[i] * support, cap), 0u}, g.front[i]);
+            depth = min(g.front[i], max(shown, 0.0f));
+        }
+        t.depth = valid ? depth : 0.0f;
         t.radius = valid ? kExactRadius : 0.0f;
         t.thickness = (g.flags[i] & kFlagLeaf) != 0u ? kLeafThickness * t.radius : t.radius;
         t.offset = vec2(0.0f, 0.0f);
         t.normalPerp = vec2(perp.x * flip, perp.y * flip);
+        if (isRounded) t.normalPerp = unpackNormal(packNormal(t.normalPerp));
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
         setTexel<false, false>(row, kPad + i, t);
     }
 }
 
 template <bool anyTurned>
-void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gathered& g, uint32_t x0, uint32_t y,
-                   uint32_t n, TexelRow& row) {
-    if (in.exactPoints)
-        resolveExact<anyTurned>(f, g, in.filtered != nullptr, x0, y, n, row);
+void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gathered& g, bool hasPlaces, uint32_t x0,
+                   uint32_t y, uint32_t n, TexelRow& row) {
+    if (!in.exactPoints) {
+        for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = row.radius[kPad + i] = 0.0f;
+        forGroups(groupsHeld(n, g.front), n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+            resolveSplats<anyTurned>(f, g, x0, y, first, last, row);
+        });
+    } else if (hasPlaces && row.isRounded)
+        resolveExact<anyTurned, true, true>(f, g, x0, y, n, row);
+    else if (hasPlaces)
+        resolveExact<anyTurned, true, false>(f, g, x0, y, n, row);
+    else if (row.isRounded)
+        resolveExact<anyTurned, false, true>(f, g, x0, y, n, row);
     else
-        resolveSplats<anyTurned>(f, g, x0, y, n, row);
+        resolveExact<anyTurned, false, false>(f, g, x0, y, n, row);
     if (row.hasMaterials)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
@@ -117,53 +143,101 @@ struct OtherPixels {
     }
 };
 
-/// A pixel that shows no point.
-[[gnu::always_inline]] inline void gatherNothing(Gathered& g, size_t i) {
-    g.x[i] = 0;
-    g.y[i] = 0;
-    g.z[i] = -1;
-    g.front[i] = 0;
-    g.radius[i] = 0;
-    g.normal[i] = 0;
-    g.colour[i] = 0;
-    g.flags[i] = kFlagNoNormal;
-    g.material[i] = kPlainPoint;
-    g.turned[i] = 0;
-    g.smooth[i] = 0;
+/// Pixels that show no point.
+void gatherNothing(uint32_t n, Gathered& g) {
+    for (size_t i = 0; i < n; ++i) g.record[i] = nullptr;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        g.front[i] = 0;
+        g.normal[i] = 0;
+        g.colour[i] = 0;
+        g.flags[i] = kFlagNoNormal;
+        g.material[i] = kPlainPoint;
+        g.turned[i] = 0;
+    }
+    for (size_t i = 0; i < n; ++i) g.smooth[i] = 0;
 }
 
-/// True if it is of a node that is turned.
-[[gnu::always_inline]] inline bool gatherPoint(const FrameConstants& f, const Tables& tables, const BlockSource& block,
-                                               uint64_t key, Gathered& g, size_t i) {
-    const PointRecord r = block.records[keyLane(key)];
+/// All of a point but its place (and of turned nodes its normal).
+[[gnu::always_inline]] inline void gatherPoint(const FrameConstants& f, const Tables& tables, const BlockSource& block,
+                                               uint64_t key, Gathered& g, size_t i, GatheredKinds& kinds) {
+    const PointRecord* const r = block.records + keyLane(key);
     const DrawNode& node = *block.node;
-    const float qx = float(int(recordX(r))), qy = float(int(recordY(r))), qz = float(int(recordZ(r)));
-    g.x[i] = node.base.x + node.axisX.x * qx + node.axisY.x * qy + node.axisZ.x * qz;
-    g.y[i] = node.base.y + node.axisX.y * qx + node.axisY.y * qy + node.axisZ.y * qz;
-    g.z[i] = node.base.z + node.axisX.z * qx + node.axisY.z * qy + node.axisZ.z * qz;
-    g.radius[i] = node.edge * tables.radiusFraction[recordRadiusCode(r)];
-    g.normal[i] = r.normal;
-    g.flags[i] = recordFlags(r);
+    g.record[i] = r;
+    g.node[i] = &node;
+    g.normal[i] = r->normal;
+    g.flags[i] = recordFlags(*r);
     if (f.hasMaterials != 0u) g.material[i] = block.materialOf(keyLane(key));
     g.front[i] = keyDepth(key);
-    g.turned[i] = 0;
+    g.turned[i] = (node.octantMask & kNodeTurned) != 0u ? 1.0f : 0.0f;
     g.smooth[i] = (node.octantMask & kNodeSmooth) != 0u ? 1 : 0;
-    const bool isTurned = (node.octantMask & kNodeTurned) != 0;
-    if (isTurned) {
-        const vec3 d = nodeUnitNormal(node, octDecode(r.normal));
-        g.turned[i] = 1;
-        g.nx[i] = d.x;
-        g.ny[i] = d.y;
-        g.nz[i] = d.z;
-    }
-    const uint32_t c = r.colour;
+    kinds.any = true;
+    kinds.flags |= recordFlags(*r);
+    kinds.octantMasks |= node.octantMask;
+    const uint32_t c = r->colour;
     if (f.debugView == kDebugLevel || f.debugView == kDebugError) {
         const vec3 d = f.debugView == kDebugLevel ? debugLevelColour(node.level) : debugErrorColour(node.errorPixels);
         g.colour[i] = packColour(d.x, d.y, d.z);
     } else {
         g.colour[i] = tables.red[c & 255u] | tables.green[c >> 8 & 255u] | tables.blue[c >> 16 & 255u];
     }
-    return isTurned;
+}
+
+/// Places and radii of the points of a row.
+void gatherPlaces(const Tables& tables, uint32_t n, Gathered& g) {
+    for (size_t i = 0; i < n; ++i) {
+        if (g.record[i] == nullptr) {
+            g.x[i] = 0;
+            g.y[i] = 0;
+            g.z[i] = -1;
+            g.radius[i] = 0;
+            continue;
+        }
+        const PointRecord r = *g.record[i];
+        const DrawNode& node = *g.node[i];
+        const float qx = float(int(recordX(r))), qy = float(int(recordY(r))), qz = float(int(recordZ(r)));
+        g.x[i] = node.base.x + node.axisX.x * qx + node.axisY.x * qy + node.axisZ.x * qz;
+        g.y[i] = node.base.y + node.axisX.y * qx + node.axisY.y * qy + node.axisZ.y * qz;
+        g.z[i] = node.base.z + node.axisX.z * qx + node.axisY.z * qy + node.axisZ.z * qz;
+        g.radius[i] = node.edge * tables.radiusFraction[recordRadiusCode(r)];
+    }
+}
+
+/// Normals of turned nodes (nodeUnitNormal). Pixels side by side are mostly of one node, whose axes are made once.
+void turnNormals(uint32_t n, Gathered& g) {
+    alignas(64) float m[9][kTile], scale[kTile], bent[kTile];
+    const DrawNode* last = nullptr;
+    NormalAxes axes{};
+    for (size_t i = 0; i < n; ++i) {
+        const DrawNode* const node = g.turned[i] > 0.5f ? g.node[i] : nullptr;
+        if (node != nullptr && node != last) {
+            axes = normalAxes(*node);
+            last = node;
+        }
+        m[0][i] = axes.x.x;
+        m[1][i] = axes.x.y;
+        m[2][i] = axes.x.z;
+        m[3][i] = axes.y.x;
+        m[4][i] = axes.y.y;
+        m[5][i] = axes.y.z;
+        m[6][i] = axes.z.x;
+        m[7][i] = axes.z.y;
+        m[8][i] = axes.z.z;
+        scale[i] = axes.scale;
+        bent[i] = node != nullptr && (node->octantMask & kNodeBent) != 0u ? 1.0f : 0.0f;
+    }
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const vec3 d = octDecode(g.normal[i]);
+        const vec3 t = vec3((m[0][i] * d.x + m[3][i] * d.y + m[6][i] * d.z) * scale[i],
+                            (m[1][i] * d.x + m[4][i] * d.y + m[7][i] * d.z) * scale[i],
+                            (m[2][i] * d.x + m[5][i] * d.y + m[8][i] * d.z) * scale[i]);
+        const bool isBent = bent[i] > 0.5f;
+        const float shorten = 1.0f / std::sqrt(max(t.x * t.x + t.y * t.y + t.z * t.z, 1.0e-37f));
+        g.nx[i] = isBent ? t.x * shorten : t.x;
+        g.ny[i] = isBent ? t.y * shorten : t.y;
+        g.nz[i] = isBent ? t.z * shorten : t.z;
+    }
 }
 
 [[gnu::always_inline]] inline void gatherOther(uint64_t key, const BlockRanges& firstBlock, size_t i,
@@ -176,17 +250,18 @@ struct OtherPixels {
 }
 
 /// What a pixel's points were blended to.
-[[gnu::always_inline]] inline void gatherBlended(const FilteredPixel& shown, uint64_t key, Gathered& g, size_t i) {
+[[gnu::always_inline]] inline void gatherBlended(const FilteredPixel& shown, uint64_t key, Gathered& g, size_t i,
+                                                 GatheredKinds& kinds) {
     const vec3 d = octDecode(shown.normal);
-    g.x[i] = g.y[i] = 0;
-    g.z[i] = 1;
+    kinds.any = true;
+    kinds.octantMasks |= kNodeTurned;
+    g.record[i] = nullptr;
     g.smooth[i] = 0;
     g.front[i] = keyDepth(key);
     g.turned[i] = 1;
     g.nx[i] = d.x;
     g.ny[i] = d.y;
     g.nz[i] = d.z;
-    g.radius[i] = 0;
     g.flags[i] = (shown.cover & kFilteredLeaf) != 0 ? kFlagLeaf : 0u;
     g.colour[i] = shown.colour;
     g.material[i] = (shown.cover & kFilteredMaterial) != 0 ? shown.cover >> 16 : kPlainPoint;
@@ -196,29 +271,35 @@ struct OtherPixels {
 /// `seconds`: of the row; before some of its points other kinds are shown.
 void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const FilteredPixel* filtered,
                const SecondPixels& seconds, uint64_t* visibility, uint32_t n, Gathered& g, OtherPixels& others,
-               bool& any, bool& anyTurned) {
-    constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
+               GatheredKinds& kinds) {
+    constexpr uint32_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     const BlockRanges firstBlock = f.firstBlock;
     for (WinningPixels& p : others.of) p.count = 0;
-    anyTurned = filtered != nullptr;
-    for (size_t i = 0; i < n; ++i) {
-        if (filtered == nullptr && i + kPrefetch < n && isPointKey(visibility[i + kPrefetch], firstBlock)) {
-            const uint64_t ahead = visibility[i + kPrefetch];
-            __builtin_prefetch(blocks[keyBlock(ahead)].records + keyLane(ahead));
+    gatherNothing(n, g);
+    // The pixels that show something, closed up without branches.
+    alignas(64) uint32_t seen[kTile + 1];
+    uint32_t count = 0;
+    const bool hasSeconds = seconds.list != nullptr;
+    for (uint32_t i = 0; i < n; ++i) {
+        seen[count] = i;
+        count += (visibility[i] != kNoKey) | (hasSeconds && seconds.kinds[i] == kSecondFront) ? 1u : 0u;
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        if (filtered == nullptr && k + kPrefetch < count) {
+            const uint64_t ahead = visibility[seen[k + kPrefetch]];
+            if (isPointKey(ahead, firstBlock)) __builtin_prefetch(blocks[keyBlock(ahead)].records + keyLane(ahead));
         }
+        const uint32_t i = seen[k];
         uint64_t key = visibility[i];
-        if (key != kNoKey) visibility[i] = kNoKey;
-        if (seconds.list != nullptr && seconds.kinds[i] == kSecondFront) key = seconds.at(i)->key;
-        if (isPointKey(key, firstBlock)) {
-            any = true;
-            if (filtered != nullptr)
-                gatherBlended(filtered[i], key, g, i);
-            else
-                anyTurned = gatherPoint(f, tables, blocks[keyBlock(key)], key, g, i) || anyTurned;
-            continue;
+        visibility[i] = kNoKey;
+        if (hasSeconds && seconds.kinds[i] == kSecondFront) key = seconds.at(i)->key;
+        if (!isPointKey(key, firstBlock)) {
+            if (key != kNoKey) gatherOther(key, firstBlock, i, others);
+        } else if (filtered != nullptr) {
+            gatherBlended(filtered[i], key, g, i, kinds);
+        } else {
+            gatherPoint(f, tables, blocks[keyBlock(key)], key, g, i, kinds);
         }
-        if (key != kNoKey) gatherOther(key, firstBlock, i, others);
-        gatherNothing(g, i);
     }
 }
 
@@ -246,7 +327,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     const FrameConstants f = frame;
     Gathered g;
     OtherPixels others;
-    bool any = false, anyTurned = false;
+    GatheredKinds kinds;
     const FilteredPixel* const filtered = in.filtered != nullptr ? in.filtered + size_t{y} * f.width + x0 : nullptr;
     const size_t first = size_t{y} * f.width + x0;
     SecondPixels seconds = in.seconds;
@@ -255,12 +336,13 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         seconds.kinds += first;
         seconds.places += first;
     }
-    gatherRow(f, tables, in.blocks, filtered, seconds, visibility, n, g, others, any, anyTurned);
+    gatherRow(f, tables, in.blocks, filtered, seconds, visibility, n, g, others, kinds);
     if (surface != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) surface[i] = 0;
     for (size_t i = 0; planes.smooth != nullptr && i < n; ++i) planes.smooth[i] = g.smooth[i];
-    if (!any) {
+    row.isRounded = in.roundsPoints && kinds.any && !others.any() && !row.hasMaterials;
+    if (!kinds.any) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
         if (row.hasMaterials)
@@ -269,10 +351,15 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         resolveOthers(f, tables, in, others, x0, y, n, row, largestRadius, planes);
         return others.any();
     }
-    if (anyTurned)
-        resolvePoints<true>(f, in, g, x0, y, n, row);
+    const bool needsPlaces = filtered == nullptr && (!in.exactPoints || in.needsDepths ||
+                                                     (kinds.flags & kFlagNoNormal) != 0u ||
+                                                     (kinds.octantMasks & kNodeSmooth) != 0u);
+    if (needsPlaces) gatherPlaces(tables, n, g);
+    if (filtered == nullptr && kinds.isTurned()) turnNormals(n, g);
+    if (kinds.isTurned())
+        resolvePoints<true>(f, in, g, needsPlaces, x0, y, n, row);
     else
-        resolvePoints<false>(f, in, g, x0, y, n, row);
+        resolvePoints<false>(f, in, g, needsPlaces, x0, y, n, row);
     uint largest = 0;  // as bits: positive floats sort like integers
     for (size_t i = 0; i < n; ++i) {
         const uint bits = floatBitsToUint(row.radius[kPad + i]);
@@ -281,4 +368,42 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     largestRadius = max(largestRadius, uintBitsToFloat(largest));
     resolveOthers(f, tables, in, others, x0, y, n, row, largestRadius, planes);
     return true;
+}
+
+/// (Colours alone: what a pixel's disc looks like otherwise matters to nobody there.)
+RowContent showPoints(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, bool tellsSmooth,
+                      uint64_t* visibility, uint32_t n, uint32_t nothing, uint32_t* __restrict rgba) {
+    const uint64_t end = drawId(f.firstBlock.of[kKindPoints + 1u], 0u);
+    alignas(64) uint32_t at[kTile];
+    const PointRecord* from[kTile];
+    uint32_t count = 0, others = 0;
+    for (uint32_t i = 0; i < n; ++i) {
+        const uint64_t key = visibility[i];
+        at[count] = i;
+        count += key != kNoKey ? 1u : 0u;
+        others |= (key != kNoKey) & ((key & kDrawIdMask) >= end) ? 1u : 0u;
+    }
+    if (others != 0u) return RowContent::other;
+    if (count == 0u) return RowContent::nothing;
+    uint32_t lastPlace = ~0u, smooth = 0;
+    const PointRecord* last = nullptr;
+    for (uint32_t k = 0; k < count; ++k) {
+        const auto place = uint32_t(visibility[at[k]]);  // all of a point's draw id
+        if (place != lastPlace) {
+            const BlockSource& block = blocks[place / kRecordsPerBlock];
+            last = block.records + place % kRecordsPerBlock;
+            __builtin_prefetch(last);
+            smooth |= block.node->octantMask;
+        }
+        lastPlace = place;
+        from[k] = last;
+    }
+    if (tellsSmooth && (smooth & kNodeSmooth) != 0u) return RowContent::other;
+    for (uint32_t i = 0; i < n; ++i) rgba[i] = nothing;
+    for (uint32_t k = 0; k < count; ++k) {
+        const uint32_t c = from[k]->colour;
+        rgba[at[k]] = tables.shownRed[c & 255u] | tables.shownGreen[c >> 8 & 255u] | tables.shownBlue[c >> 16 & 255u];
+        visibility[at[k]] = kNoKey;
+    }
+    return RowContent::points;
 }

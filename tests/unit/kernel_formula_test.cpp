@@ -154,7 +154,7 @@ TEST(KernelFormulas, TexelsArePackedAndUnpackedAsOne) {
             std::vector<Texel> texels;
             for (uint32_t i = 0; i < n; ++i) put(*row, cpu::kPad + i, texels.emplace_back(randomTexel(rng, true)));
             k.packRow(*row, n, planes);
-            k.unpackRow(planes, cpu::kPad, n, *back);
+            k.unpackRow(planes, cpu::kPad, n, ~0u, *back);
             for (uint32_t i = 0; i < n; ++i) {
                 const PackedTexel p = packTexel(texels[i]);
                 ASSERT_EQ(p.size, size[i]);
@@ -179,10 +179,12 @@ TEST(KernelFormulas, PulledAndPushedTexelsAreThoseOfTheFormulas) {
         for (int round = 0; round < 100; ++round) {
             *upper = *lower = *out = {};
             std::vector<Texel> a, b;
-            for (uint32_t i = 0; i < 2 * n; ++i) {
-                put(*upper, cpu::kPad + i, a.emplace_back(randomTexel(rng, true)));
-                put(*lower, cpu::kPad + i, b.emplace_back(randomTexel(rng, true)));
-            }
+            for (uint32_t i = 0; i < 2 * n; ++i)
+                for (const auto& [row, texels] : {std::pair{upper.get(), &a}, std::pair{lower.get(), &b}}) {
+                    Texel t = randomTexel(rng, true);
+                    if (round % 2 == 0 && i < 2 * cpu::kTexelGroup) t.depth = 0;  // of a whole group of theirs
+                    put(*row, cpu::kPad + i, texels->emplace_back(t));
+                }
             k.pullRow(*upper, *lower, n, 1, f.focal, *out);
             for (uint32_t i = 0; i < n; ++i) {
                 const Texel t = pullTexels(a[2 * i], a[2 * i + 1], b[2 * i], b[2 * i + 1], 1, lens);
@@ -199,12 +201,14 @@ TEST(KernelFormulas, PulledAndPushedTexelsAreThoseOfTheFormulas) {
                 for (uint32_t i = 0; i < n + 2; ++i) {
                     Texel t = randomTexel(rng, true);
                     t.radius *= 2;
+                    if (round % 2 == 0 && i < cpu::kTexelGroup)
+                        t.depth = 0;  // of the first group of fine texels, and one beyond
                     put(*coarse, cpu::kPad - 1 + i, rows.at(r).emplace_back(t));
                 }
                 auto& to = r == 0 ? *nearRow : *farRow;
                 k.expandRow(*coarse, 2 * n, x + 0.5f, y + (r == 0 ? 0.5f : 2.5f), size, f.focal, to.nearest, to.beside);
             }
-            k.pushRow(*upper, *nearRow, *farRow, 1, x, y, 2 * n, 1, f.focal, *out);
+            k.pushRow(*upper, *nearRow, *farRow, 1, x, y, 2 * n, ~0u, 1, f.focal, *out);
             for (uint32_t i = 0; i < 2 * n; ++i) {
                 const uint32_t at = i / 2 + 1, side = i % 2 == 0 ? at - 1 : at + 1;
                 const float sx = i % 2 == 0 ? -1.0f : 1.0f;

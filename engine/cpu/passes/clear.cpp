@@ -14,8 +14,8 @@ void resize(Frame& frame) {
     resizeHuge(frame.image->depth, frame.wantAll ? pixels : 0);
     resizeHuge(frame.image->normal, frame.wantAll ? pixels * 3 : 0);
     resizeHuge(frame.image->linear, frame.wantAll ? pixels * 3 : 0);
-    frame.pyramid.resize(w, h, frame.constants.hasMaterials != 0);
-    if (frame.hasSmooth) frame.pixels.fit(w, h, frame.constants.hasMaterials != 0);
+    if (frame.hasPyramid || frame.hasSmooth) frame.pyramid.resize(w, h, frame.constants.hasMaterials != 0);
+    if (!frame.hasPyramid) frame.shownRows.resize(size_t{(w + kTile - 1) / kTile} * h);
     if (frame.visibilityPixels == pixels) return;  // it is clear whatever its shape
     frame.visibilityPixels = pixels;
     frame.visibility.assign(pixels, shared::kNoKey);

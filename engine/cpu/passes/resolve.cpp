@@ -1,8 +1,8 @@
 // From the visibility buffer to the texels of level 0.
-#include <array>
+#include "engine/cpu/passes/resolve.h"
+
 #include <atomic>
 
-#include "engine/cpu/passes/passes.h"
 #include "engine/render/kinds/kind.h"
 
 namespace stipple::cpu {
@@ -37,28 +37,13 @@ bool isTouched(const Frame& frame, const Level& fine, const Level* coarse, uint3
            (coarse != nullptr && coarse->mayHoldParents(x0, n, row0, row1, false));
 }
 
-/// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
+/// Level 0 from the visibility buffer, and level 1 on the way.
 void resolve(Frame& frame) {
-    Level& fine = frame.texels();
-    Level* coarse = frame.hasPyramid && frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
+    Level& fine = frame.pyramid.level(0);
+    Level* coarse = frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
     frame.pyramid.beginFrame(frame.constants, frame.hasCurves);
     const Planes finePlanes = fine.planes();
-    preparePlanes(frame, size_t{fine.width} * fine.height);
-    std::array<ResolveKind, shared::kKindNothing> ofKind{};
-    render::forEachKind([&](lod::Kind kind) { ofKind.at(static_cast<size_t>(kind)) = cpuKind(kind).resolve; });
-    const ResolveInput input{.blocks = frame.blocks.data(),
-                             .meshBlocks = frame.meshBlocks.data(),
-                             .materials = frame.draws->materials.data(),
-                             .patchBlocks = frame.patchBlocks.data(),
-                             .curveBlocks = frame.curveBlocks.data(),
-                             .discs = frame.discs.data(),
-                             .discBoxes = frame.discBoxes.data(),
-                             .discCount = frame.discs.size(),
-                             .exactPoints = frame.mode->fillsSplats,
-                             .filtered = frame.isBlended() ? frame.filtered.data() : nullptr,
-                             .seconds = frame.seconds(),
-                             .frame = &frame,
-                             .ofKind = ofKind.data()};
+    const RowResolver resolver(frame);
     std::atomic<float> largestRadius{0};
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         if (!isTouched(frame, fine, coarse, x0, n, row0, row1)) return;
@@ -80,14 +65,11 @@ void resolve(Frame& frame) {
                     continue;
                 }
                 row->hasTubes = frame.hasCurves;  // may have; the kernel says whether it does
-                const bool has = frame.k.resolveRow(frame.constants, frame.tables, input, frame.visibility.data() + at,
-                                                    x0, yy, n, *row, largest, frame.planesAt(at));
-                if (has) {
-                    fine.hold(yy, x0, n);
-                    frame.k.packRow(*row, n, finePlanes.at(at));
-                } else {
+                const bool has = resolver.resolve(x0, yy, n, *row, largest);
+                if (has)
+                    fine.hold(yy, x0, n, frame.k.packRow(*row, n, finePlanes.at(at)));
+                else
                     fine.empty(yy, x0, n);
-                }
                 any = any || has;
             }
             if (!coarse) continue;
@@ -97,12 +79,45 @@ void resolve(Frame& frame) {
         while (largest > seen && !largestRadius.compare_exchange_weak(seen, largest, std::memory_order_relaxed)) {
         }
     });
-    std::fill(frame.runs.begin(), frame.runs.end(), uint8_t{0});  // resolveRow has cleared what they stood for
-    if (&fine == &frame.pyramid.level(0)) frame.pyramid.setLargestRadius(largestRadius.load());
+    resolver.finish();
+    frame.pyramid.setLargestRadius(largestRadius.load());
 }
 
 }  // namespace
 
-constinit const CpuPass resolvePass{.run = resolve};
+RowResolver::RowResolver(Frame& frame)
+    : frame_(frame),
+      input_{.blocks = frame.blocks.data(),
+             .meshBlocks = frame.meshBlocks.data(),
+             .materials = frame.draws->materials.data(),
+             .patchBlocks = frame.patchBlocks.data(),
+             .curveBlocks = frame.curveBlocks.data(),
+             .discs = frame.discs.data(),
+             .discBoxes = frame.discBoxes.data(),
+             .discCount = frame.discs.size(),
+             .exactPoints = frame.mode->fillsSplats,
+             .needsDepths = true,
+             .roundsPoints = false,
+             .filtered = frame.isBlended() ? frame.filtered.data() : nullptr,
+             .seconds = frame.seconds(),
+             .frame = &frame,
+             .ofKind = nullptr} {
+    preparePlanes(frame, frame.visibilityPixels);
+    render::forEachKind([&](lod::Kind kind) { ofKind_.at(static_cast<size_t>(kind)) = cpuKind(kind).resolve; });
+    input_.ofKind = ofKind_.data();
+}
+
+bool RowResolver::resolve(uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius) const {
+    const size_t at = size_t{y} * frame_.constants.width + x0;
+    return frame_.k.resolveRow(frame_.constants, frame_.tables, input_, frame_.visibility.data() + at, x0, y, n, row,
+                               largestRadius, frame_.planesAt(at));
+}
+
+void RowResolver::finish() const { std::fill(frame_.runs.begin(), frame_.runs.end(), uint8_t{0}); }
+
+/// Without a pyramid rows are resolved where they are shown.
+constinit const CpuPass resolvePass{.run = [](Frame& frame) {
+    if (frame.hasPyramid) resolve(frame);
+}};
 
 }  // namespace stipple::cpu

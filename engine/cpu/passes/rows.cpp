@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "engine/cpu/passes/passes.h"
+#include "engine/cpu/passes/resolve.h"
 #include "engine/cpu/passes/seconds.h"
 #include "engine/cpu/passes/shown_tiles.h"
 #include "shaders/shared/bindings.h"
@@ -66,7 +66,6 @@ class RowProgram {
   public:
     RowProgram(Frame& frame, std::span<const render::Pass> passes, std::span<const render::Pass> later)
         : frame_(frame),
-          fine_(frame.texels()),
           isKept_(!render::passInfo(passes.back()).writes.has(render::Plane::image)),
           isFirst_(passes.front() == render::Pass::surface),
           empty_(emptyPixel(frame)) {
@@ -122,6 +121,26 @@ class RowProgram {
         finish(at, planes, surface);
     }
 
+    /// Is the picture of a row of points their own colours, and nothing else asked for?
+    bool showsOwnColours() const {
+        for (const Step& step : steps_)
+            if (step.pass != &cpuPassOf(render::Pass::output).row && concerns(*step.pass, {})) return false;
+        return !isKept_ && !frame_.wantAll && frame_.constants.debugView == shared::kDebugNone && !frame_.isBlended() &&
+               !frame_.draws->hasSurfaces() && !frame_.draws->hasBlending;
+    }
+    /// Does anything read how deep pixels are?
+    bool needsDepths() const {
+        const SurfaceWants wants = wantsOf(frame_.planesAt(0));
+        return wants.depth || wants.ownDepth;
+    }
+    /// Then this shows such a row.
+    RowContent showPoints(uint32_t x0, uint32_t n, uint32_t y) const {
+        const RowPlace at = placeOf(x0, n, y);
+        return frame_.k.showPoints(frame_.constants, frame_.tables, frame_.blocks.data(), frame_.hasSmooth,
+                                   frame_.visibility.data() + at.first, n, empty_.rgba.front(),
+                                   outputAt(frame_, at.first).rgba);
+    }
+
     /// What shows nothing.
     void finishEmpty(const TileRect& rect) const {
         for (uint32_t y = rect.row0; y < rect.row1; ++y) finishEmpty(placeOf(rect.x0, rect.n, y));
@@ -136,11 +155,11 @@ class RowProgram {
         return wants;
     }
     RowPlace placeOf(uint32_t x0, uint32_t n, uint32_t y) const {
-        return {frame_, x0, y, n, size_t{y} * fine_.width + x0};
+        return {frame_, x0, y, n, size_t{y} * frame_.constants.width + x0};
     }
     /// Of a row without winners the planes are those of an older frame.
     SurfacePlanes planesOf(const RowPlace& at) const {
-        return fine_.mayHold(at.y, at.x0, at.n) ? frame_.planesAt(at.first) : SurfacePlanes{};
+        return frame_.mayShow(at.x0, at.y, at.n) ? frame_.planesAt(at.first) : SurfacePlanes{};
     }
     bool concerns(const RowPass& step, const SurfacePlanes& planes) const {
         return step.concerns == nullptr || step.concerns(frame_, planes);
@@ -203,7 +222,6 @@ class RowProgram {
     }
 
     Frame& frame_;
-    Level& fine_;
     bool isKept_;
     bool showsEmpty_ = false;
     bool isFirst_;         ///< surfaces are made in this run; else an earlier one has kept them
@@ -212,58 +230,167 @@ class RowProgram {
     std::vector<Step> steps_;  ///< after the surface
 };
 
-/// Does any pixel of the tile show a point of a node that is smooth?
-bool showsWide(Frame& frame, const Level& shown, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
-    for (uint32_t y = row0; y < row1; ++y) {
-        const uint8_t* const first = frame.smooth.data() + size_t{y} * shown.width + x0;
-        if (shown.mayHold(y, x0, n) && std::find(first, first + n, uint8_t{1}) != first + n) return true;
+/// Texels of the rows of one tile, rounded as levels hold them.
+class TileTexels {
+  public:
+    void keep(const Kernels& k, const TexelRow& row, uint32_t n, uint32_t line) {
+        hasTubes_.at(line) = row.hasTubes;
+        held_.at(line) = k.packRow(row, n, planesOf(line));
     }
-    return false;
-}
+    void load(const Frame& frame, uint32_t n, uint32_t line, TexelRow& row) {
+        row.hasTubes = hasTubes_.at(line);
+        row.hasMaterials = frame.constants.hasMaterials != 0;
+        frame.k.unpackRow(planesOf(line), kPad, n, held_.at(line), row);
+        if (frame.hasCurves && !row.hasTubes) Pyramid::clearTubes(row);
+    }
+
+  private:
+    using Line = std::array<uint32_t, kTile>;
+    Planes planesOf(uint32_t line) {
+        const auto at = [&](size_t plane) { return words_.at(plane).at(line).data(); };
+        return {reinterpret_cast<float*>(at(0)), at(1), at(2), at(3), at(4), at(5)};
+    }
+    alignas(64) std::array<std::array<Line, kTileRows>, 6> words_;
+    std::array<uint32_t, kTileRows> held_;
+    std::array<bool, kTileRows> hasTubes_;
+};
+
+/// Tiles from the visibility buffer to the picture, where no pyramid is made of their pixels.
+class TileProgram {
+  public:
+    TileProgram(Frame& frame, const RowProgram& program)
+        : frame_(frame), program_(program), resolver_(frame), showsOwnColours_(program.showsOwnColours()) {
+        resolver_.setPoints(program.needsDepths(), !mayBeWide());
+    }
+
+    bool mayShow(const TileRect& r) const {
+        bool any = false;
+        for (uint32_t y = r.row0; y < r.row1; ++y) any = any || frame_.isSeen(pixelAt(r.x0, y), r.n);
+        return any;
+    }
+    void finishEmpty(const TileRect& r) const {
+        for (uint32_t y = r.row0; y < r.row1; ++y)
+            for (uint32_t x = r.x0; x < r.x0 + r.n; x += kTile) frame_.shownRow(x, y) = 0;
+        program_.finishEmpty(r);
+    }
+    void run(const TileRect& r) const {
+        thread_local TexelRow row{};
+        thread_local TileTexels texels;
+        const bool hasWide = mayBeWide();
+        std::array<bool, kTileRows> isShown{};
+        std::array<uint32_t, kTileRows> wide{};
+        for (uint32_t y = r.row0; y < r.row1; ++y) {
+            const uint32_t line = hasWide ? y - r.row0 : 0;
+            isShown.at(line) = showsOwnColours_ && showPoints(r, y);
+            if (isShown.at(line)) continue;
+            const bool any = resolve(r, y, row);
+            if (any && !row.isRounded) texels.keep(frame_.k, row, r.n, line);
+            if (!hasWide) show(r, y, texels, line, row, nullptr);
+            wide.at(line) = hasWide && any ? wideGroups(r, y) : 0;
+        }
+        if (!hasWide) return;
+        const auto wanted = [&](uint32_t y) { return wide.at(y - r.row0); };
+        const auto use = [&](uint32_t y, TexelRow&, TexelRow& smooth, bool any) {
+            const uint32_t line = y - r.row0;
+            row.isRounded = false;
+            if (!isShown.at(line)) show(r, y, texels, line, row, any ? &smooth : nullptr);
+        };
+        frame_.pyramid.pushTile(frame_.pyramid.level(0), frame_.pyramid.level(1), 1.0f, r.x0, r.n, r.row0, r.row1,
+                                wanted, use);
+    }
+    void finish() const { resolver_.finish(); }
+
+  private:
+    bool mayBeWide() const { return frame_.hasSmooth && frame_.pyramid.isUsed(); }
+    size_t pixelAt(uint32_t x, uint32_t y) const { return size_t{y} * frame_.constants.width + x; }
+    bool resolve(const TileRect& r, uint32_t y, TexelRow& row) const {
+        row.isRounded = false;
+        row.hasTubes = frame_.hasCurves;  // may have; the kernel says whether it does
+        row.hasMaterials = frame_.constants.hasMaterials != 0;
+        float largest = 0;
+        const bool any = frame_.isSeen(pixelAt(r.x0, y), r.n) && resolver_.resolve(r.x0, y, r.n, row, largest);
+        frame_.shownRow(r.x0, y) = any ? 1 : 0;
+        return any;
+    }
+    void show(const TileRect& r, uint32_t y, TileTexels& texels, uint32_t line, TexelRow& row,
+              const TexelRow* smooth) const {
+        const bool any = frame_.shownRow(r.x0, y) != 0;
+        if (any && !row.isRounded) texels.load(frame_, r.n, line, row);
+        program_.run(r.x0, r.n, y, row, row, any, smooth);
+    }
+    /// False, and nothing is done, where a row shows more than points' own colours.
+    bool showPoints(const TileRect& r, uint32_t y) const {
+        const bool isSeen = frame_.isSeen(pixelAt(r.x0, y), r.n);
+        const RowContent content = isSeen ? program_.showPoints(r.x0, r.n, y) : RowContent::nothing;
+        if (content == RowContent::other) return false;
+        frame_.shownRow(r.x0, y) = content == RowContent::points ? 1 : 0;
+        if (content == RowContent::nothing) program_.finishEmpty({r.x0, r.n, y, y + 1});
+        return true;
+    }
+    /// Groups of the row's pixels in which some show a point of a node that is smooth.
+    uint32_t wideGroups(const TileRect& r, uint32_t y) const {
+        const uint8_t* const first = frame_.smooth.data() + pixelAt(r.x0, y);
+        uint32_t groups = 0;
+        for (uint32_t x = 0; x < r.n; x += kTexelGroup) {
+            const uint8_t* const end = first + std::min(x + kTexelGroup, r.n);
+            if (std::find(first + x, end, uint8_t{1}) != end) groups |= 1u << (x / kTexelGroup);
+        }
+        return groups;
+    }
+
+    Frame& frame_;
+    const RowProgram& program_;
+    RowResolver resolver_;
+    const bool showsOwnColours_;
+};
 
 /// May any pixel show something? Of a pyramid the last push reads the parents of a tile's texels and those beside them.
 bool mayShow(Frame& frame, const TileRect& r) {
-    return frame.texels().mayHoldTile(r.x0, r.n, r.row0, r.row1) ||
-           (frame.hasPyramid && frame.pyramid.isUsed() &&
-            frame.pyramid.level(1).mayHoldParents(r.x0, r.n, r.row0, r.row1, true));
+    bool any = false;
+    for (uint32_t y = r.row0; y < r.row1; ++y) any = any || frame.mayShow(r.x0, y, r.n);
+    return any || (frame.hasPyramid && frame.pyramid.isUsed() &&
+                   frame.pyramid.level(1).mayHoldParents(r.x0, r.n, r.row0, r.row1, true));
+}
+
+/// A tile of a pyramid's texels.
+void pushTexels(Frame& frame, const RowProgram& program, const TileRect& rect) {
+    const auto [x0, n, row0, row1] = rect;
+    Level& fine = frame.pyramid.level(0);
+    if (frame.pyramid.isUsed()) {
+        // The last push, into level 0.
+        frame.pyramid.pushTile(
+            fine, frame.pyramid.level(1), 1.0f, x0, n, row0, row1, [](uint32_t) { return ~0u; },
+            [&](uint32_t y, TexelRow& own, TexelRow& row, bool any) { program.run(x0, n, y, own, row, any); });
+        return;
+    }
+    thread_local TexelRow shown{};
+    for (uint32_t y = row0; y < row1; ++y) {
+        shown.hasTubes = frame.hasCurves;
+        shown.hasMaterials = frame.constants.hasMaterials != 0;
+        const bool any = frame.pyramid.loadRow(fine, fine.planes(), y, x0, n, shown);
+        program.run(x0, n, y, shown, shown, any);
+    }
 }
 
 }  // namespace
 
 void runRows(Frame& frame, std::span<const render::Pass> passes, std::span<const render::Pass> later) {
-    Level& fine = frame.texels();
-    const Planes planes = fine.planes();
     const RowProgram program(frame, passes, later);
+    const uint32_t width = frame.constants.width, height = frame.constants.height;
     const bool isFromTexels = passes.front() == render::Pass::surface;
+    if (isFromTexels && !frame.hasPyramid) {
+        const TileProgram tiles(frame, program);
+        forShownTiles(
+            frame.executor, width, height, [&](const TileRect& r) { return tiles.mayShow(r); },
+            [&](const TileRect& r) { tiles.finishEmpty(r); }, [&](const TileRect& r) { tiles.run(r); });
+        tiles.finish();
+        return;
+    }
     const auto shows = [&](const TileRect& r) { return mayShow(frame, r); };
     const auto empty = [&](const TileRect& r) { program.finishEmpty(r); };
-    forShownTiles(frame.executor, fine.width, fine.height, shows, empty, [&](const TileRect& rect) {
-        const auto [x0, n, row0, row1] = rect;
-        if (!isFromTexels) {
-            for (uint32_t y = row0; y < row1; ++y) program.resume(x0, n, y);
-            return;
-        }
-        thread_local TexelRow shown{};
-        const auto show = [&](uint32_t y, const TexelRow* smooth) {
-            shown.hasTubes = frame.hasCurves;
-            shown.hasMaterials = frame.constants.hasMaterials != 0;
-            const bool any = frame.pyramid.loadRow(fine, planes, y, x0, n, kPad, shown);
-            program.run(x0, n, y, shown, shown, any, smooth);
-        };
-        if (frame.hasSmooth && frame.pyramid.isUsed() && showsWide(frame, fine, x0, n, row0, row1)) {
-            frame.pyramid.pushTile(
-                frame.pyramid.level(0), frame.pyramid.level(1), 1.0f, x0, n, row0, row1,
-                [&](uint32_t y, TexelRow&, TexelRow& smooth, bool any) { show(y, any ? &smooth : nullptr); });
-            return;
-        }
-        if (frame.hasPyramid && frame.pyramid.isUsed()) {
-            // The last push, into level 0.
-            frame.pyramid.pushTile(
-                fine, frame.pyramid.level(1), 1.0f, x0, n, row0, row1,
-                [&](uint32_t y, TexelRow& own, TexelRow& row, bool any) { program.run(x0, n, y, own, row, any); });
-            return;
-        }
-        for (uint32_t y = row0; y < row1; ++y) show(y, nullptr);
+    forShownTiles(frame.executor, width, height, shows, empty, [&](const TileRect& r) {
+        if (isFromTexels) return pushTexels(frame, program, r);
+        for (uint32_t y = r.row0; y < r.row1; ++y) program.resume(r.x0, r.n, y);
     });
 }
 

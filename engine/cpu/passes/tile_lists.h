@@ -42,7 +42,7 @@ class TileLists {
                     const uint32_t count =
                         std::min(shared::kRecordsPerBlock, block.node->count - frame_.draws->points().blocks[b].first);
                     frame_.k.placeSplats(frame_.constants, *block.node, block.records, count, reach_, placed);
-                    keep(placed, count, c, static_cast<uint32_t>(b * shared::kRecordsPerBlock), countsTiles);
+                    keep(placed, count, c, static_cast<uint32_t>(b * shared::kRecordsPerBlock));
                 }
             }
         });
@@ -90,39 +90,56 @@ class TileLists {
     }
 
   private:
-    void keep(const SplatBlock& b, uint32_t count, size_t chunk, uint32_t firstId, bool countsTiles) {
+    void keep(const SplatBlock& b, uint32_t count, size_t chunk, uint32_t firstId) {
         const auto tile = [](int pixel, uint32_t size) {
             return static_cast<uint16_t>(static_cast<uint32_t>(pixel) / size);
         };
-        size_t at = chunk * blocksPerChunk_ * shared::kRecordsPerBlock + counts_[chunk];
+        const size_t first = chunk * blocksPerChunk_ * shared::kRecordsPerBlock + counts_[chunk];
+        // (At hand: after each store they would be read again.)
+        PlacedSplat* splat = splats_.data() + first;
+        TileRange* range = ranges_.data() + first;
+        const bool isBlended = frame_.isBlended();
+        uint32_t* colour = isBlended ? frame_.placedColours.data() + first : nullptr;
+        const uint32_t alone = isBlended ? 0u : ~0u;
+        uint64_t entries = 0;
         for (uint32_t i = 0; i < count; ++i) {
             if (b.keep[i] == 0) continue;
-            if (frame_.isBlended()) frame_.placedColours[at] = b.colour[i];
-            splats_[at] = {b.cx[i], b.cy[i], b.cz[i],     b.nx[i],
-                           b.ny[i], b.nz[i], b.radius[i], (firstId + i) | (frame_.isBlended() ? 0u : b.alone[i])};
-            const TileRange range{tile(b.firstX[i], SplatTile::kWidth), tile(b.firstY[i], SplatTile::kHeight),
-                                  tile(b.lastX[i], SplatTile::kWidth), tile(b.lastY[i], SplatTile::kHeight)};
-            ranges_[at++] = range;
-            entries_[chunk] += range.tiles();
-            if (countsTiles)
-                for (uint32_t y = range.firstY; y <= range.lastY; ++y)
-                    for (uint32_t x = range.firstX; x <= range.lastX; ++x)
-                        ++frame_.tileEnds[(chunk * rows_ + y) * columns_ + x];
-            ++counts_[chunk];
+            if (isBlended) *colour++ = b.colour[i];
+            *splat++ = {b.cx[i], b.cy[i], b.cz[i],     b.nx[i],
+                        b.ny[i], b.nz[i], b.radius[i], (firstId + i) | (b.alone[i] & alone)};
+            *range = {tile(b.firstX[i], SplatTile::kWidth), tile(b.firstY[i], SplatTile::kHeight),
+                      tile(b.lastX[i], SplatTile::kWidth), tile(b.lastY[i], SplatTile::kHeight)};
+            entries += range++->tiles();
+        }
+        const auto kept = static_cast<uint32_t>(splat - (splats_.data() + first));
+        counts_[chunk] += kept;
+        entries_[chunk] += entries;
+        if (!isCounted_) return;
+        uint32_t* const ends = frame_.tileEnds.data() + chunk * rows_ * columns_;
+        forTilesOf(first, first + kept, 0, rows_, [&](size_t at, uint32_t) { ++ends[at]; });
+    }
+
+    /// Calls use(tile, place of the disc) for each disc of [first, last) and each tile of these rows that it reaches;
+    /// tiles are counted from the first of the rows on.
+    template <typename Use>
+    void forTilesOf(size_t first, size_t last, uint32_t firstRow, uint32_t lastRow, const Use& use) const {
+        const TileRange* const ranges = ranges_.data();
+        const uint32_t columns = columns_;
+        for (size_t at = first; at < last; ++at) {
+            const TileRange r = ranges[at];
+            const uint32_t y0 = std::max<uint32_t>(r.firstY, firstRow), y1 = std::min<uint32_t>(r.lastY + 1u, lastRow);
+            for (uint32_t y = y0; y < y1; ++y) {
+                const size_t row = size_t{y - firstRow} * columns;
+                for (uint32_t x = r.firstX; x <= r.lastX; ++x) use(row + x, static_cast<uint32_t>(at));
+            }
         }
     }
 
-    /// Calls use(tile, place of the disc) for each disc of a chunk and each tile of these rows that it reaches; tiles
-    /// are counted from the first of the rows on.
+    /// The same of a chunk.
     template <typename Use>
     void forEntries(size_t chunk, uint32_t firstRow, uint32_t lastRow, const Use& use) const {
-        forDiscs(chunk, [&](size_t at) {
-            const TileRange r = ranges_[at];
-            const uint32_t last = std::min<uint32_t>(r.lastY + 1u, lastRow);
-            for (uint32_t y = std::max<uint32_t>(r.firstY, firstRow); y < last; ++y)
-                for (uint32_t x = r.firstX; x <= r.lastX; ++x)
-                    use(size_t{y - firstRow} * columns_ + x, static_cast<uint32_t>(at));
-        });
+        const size_t first = chunk * blocksPerChunk_ * shared::kRecordsPerBlock;
+        forTilesOf(first, first + counts_[chunk], firstRow, lastRow, use);
     }
 
     /// Rows [firstRow, lastRow) of tiles, of which `sum` is the length of the lists.
@@ -151,9 +168,7 @@ class TileLists {
         std::vector<uint32_t>& places = frame_.tilePlaces;
         places.resize(std::max(places.size(), static_cast<size_t>(sum)));
         frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
-            for (size_t c = begin; c < end; ++c)
-                forEntries(c, firstRow, lastRow,
-                           [&](size_t tile, uint32_t at) { places[ends[c * tiles + tile]++] = at; });
+            for (size_t c = begin; c < end; ++c) putInto(places.data(), ends.data() + c * tiles, c, firstRow, lastRow);
         });
         frame_.executor.parallelFor(tiles, 4, [&](size_t begin, size_t end) {
             for (size_t t = begin; t < end; ++t)
@@ -161,6 +176,11 @@ class TileLists {
                     drawTile(splats_.data(), places.data() + starts[t], starts[t + 1] - starts[t],
                              tileAt(t + size_t{firstRow} * columns_));
         });
+    }
+
+    /// `next`: of each tile, where its next entry goes.
+    void putInto(uint32_t* places, uint32_t* next, size_t chunk, uint32_t firstRow, uint32_t lastRow) const {
+        forEntries(chunk, firstRow, lastRow, [&](size_t tile, uint32_t at) { places[next[tile]++] = at; });
     }
 
     SplatTile tileAt(size_t tile) const {
