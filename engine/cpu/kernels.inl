@@ -402,7 +402,7 @@ void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
         const size_t at = kPad + i;
         const Texel t = texelAt<true, false>(row, at);
         const TubeSurface s = tubeSurface(t, lens);
-        const bool isTubeHere = t.isRound > 0.5f;
+        const bool isTubeHere = (t.isRound > 0.5f) & (t.depth > 0.0f);  // nobody wrote the rest of an empty one
         row.perpX[at] = isTubeHere ? s.normalPerp.x : t.normalPerp.x;
         row.perpY[at] = isTubeHere ? s.normalPerp.y : t.normalPerp.y;
         row.depth[at] = isTubeHere ? s.depth : t.depth;

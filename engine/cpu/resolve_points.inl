@@ -385,13 +385,14 @@ RowContent showPoints(const FrameConstants& f, const Tables& tables, const Block
     }
     if (others != 0u) return RowContent::other;
     if (count == 0u) return RowContent::nothing;
-    uint32_t lastPlace = ~0u, smooth = 0;
+    uint64_t lastPlace = kNoKey;
+    uint32_t smooth = 0;
     const PointRecord* last = nullptr;
     for (uint32_t k = 0; k < count; ++k) {
-        const auto place = uint32_t(visibility[at[k]]);  // all of a point's draw id
+        const uint64_t place = visibility[at[k]] & kDrawIdMask;
         if (place != lastPlace) {
-            const BlockSource& block = blocks[place / kRecordsPerBlock];
-            last = block.records + place % kRecordsPerBlock;
+            const BlockSource& block = blocks[keyBlock(place)];
+            last = block.records + keyLane(place);
             __builtin_prefetch(last);
             smooth |= block.node->octantMask;
         }
