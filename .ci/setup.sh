@@ -34,10 +34,10 @@ install_packages() {
     DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# build_program TARGET...: what ./run needs and no more: what is not compiled keeps nobody waiting.
+# build_program TARGET: for ./run: what is not compiled keeps nobody waiting, tests are not there.
 build_program() {
     [ -f build/build.ninja ] || configure release -DBUILD_TESTING=OFF -DCMAKE_UNITY_BUILD=ON || return 1
-    compile build --target "$@"
+    compile build --target "$1"
 }
 
 # build_preset PRESET: all of it, with the tests.
