@@ -36,8 +36,8 @@ TEST(Denormals, ChangeNeitherStoresNorPictures) {
     auto points = test::bumpySphere(4'000, 1);
     Rng rng(1);
     for (test::TestPoint& p : points) p.colour = rng.below(4) == 0 ? 0 : static_cast<uint32_t>(rng.below(0x1000000));
-    // As it is, and so small that products of four of its lengths are denormal in fp32.
-    for (const double scale : {1.0, 1e-10}) {
+    // As it is, and so small that products of four of its lengths, and of two, are denormal in fp32.
+    for (const double scale : {1.0, 1e-10, 1e-20}) {
         auto scaled = points;
         for (test::TestPoint& p : scaled) p.position *= scale;
         test::writePly(folder / "a.ply", scaled);

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <map>
 
+#include "engine/cpu/cpu_backend.h"
 #include "engine/reference/decode.h"
 #include "tests/support/support.h"
 
@@ -161,10 +162,35 @@ TEST(Build, EveryCountFromOneToSixteenWorks) {
     const auto executor = makeSerialExecutor();
     for (size_t count = 1; count <= 16; ++count) {
         const test::TempFolder folder;
-        test::writePly(folder / "a.ply", test::bumpySphere(count, count), false);
+        const std::vector<test::TestPoint> points = test::bumpySphere(count, count);
+        test::writePly(folder / "a.ply", points, false);
+        double extent = 0;
+        for (const test::TestPoint& a : points)
+            for (const test::TestPoint& b : points) extent = std::max(extent, glm::distance(a.position, b.position));
         for (const uint32_t leafRecords : {1u, 4u, 8192u}) {
+            SCOPED_TRACE(testing::Message() << count << " points, " << leafRecords << " a leaf");
             const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, leafRecords);
             EXPECT_EQ(store->description.points, count);
+            const lod::Hierarchy& h = store->hierarchy;
+            uint64_t records = 0;
+            for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+                if (!h.nodes[n].isLeaf()) continue;
+                const auto chunk = lod::readChunk(*store, n);
+                ASSERT_TRUE(chunk);
+                for (const shared::PointRecord& r : chunk->records) {
+                    const reference::Disc d = reference::decodeDisc(h, h.nodes[n], r);
+                    ++records;
+                    EXPECT_EQ(d.radius > 0, count > 1) << "what has a neighbour has a width";
+                    EXPECT_LE(d.radius, extent) << "of neighbours that are there";
+                    EXPECT_TRUE(std::isfinite(d.normal.x + d.normal.y + d.normal.z));
+                    if (count <= 2) EXPECT_NE(d.flags & shared::kFlagNoNormal, 0u) << "two points have no plane";
+                }
+            }
+            EXPECT_EQ(records, count);
+            const auto backend = cpu::makeCpuBackend(*executor);
+            const render::Image image = test::renderView(store, *backend, *executor, test::fitView(*store, 64, 48),
+                                                         test::drawnAs(render::Mode::pullpush, 1));
+            EXPECT_GT(std::count_if(image.depth.begin(), image.depth.end(), [](float z) { return z > 0; }), 0);
         }
     }
 }
