@@ -17,7 +17,7 @@
 namespace stipple::app {
 namespace {
 
-struct Options {
+struct BuildCommand {
     std::vector<std::string> inputs;
     std::string output;
     BuildOptions build;
@@ -26,7 +26,7 @@ struct Options {
 };
 
 /// Of the output, also where its temporary file was being checked.
-Error interruptedAt(Error error, const Options& o) {
+Error interruptedAt(Error error, const BuildCommand& o) {
     if (error.where.find(".partial") == std::string::npos) return error;
     return {ErrorKind::interrupted, "interrupted; nothing is written", o.output, ""};
 }
@@ -39,7 +39,7 @@ std::vector<std::string> allNotes(const lod::BuildReport& report) {
     return notes;
 }
 
-Result<void> run(const Options& o, bool& isSilent) {
+Result<void> run(const BuildCommand& o, bool& isSilent) {
     catchStopSignals();
     MpiJob job;
     BuildOptions build = o.build;
@@ -107,7 +107,7 @@ Result<void> run(const Options& o, bool& isSilent) {
 }  // namespace
 
 void setupBuild(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BuildCommand>();
     CLI::App* sub = app.add_subcommand("build",
                                        "build the hierarchy of scans (.ply, .las, .laz, .vdb), of a mesh (.ply with "
                                        "faces, .vdb, .gltf, .glb, .obj) or of "

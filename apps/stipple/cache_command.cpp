@@ -17,7 +17,7 @@ namespace {
 
 using Clock = std::chrono::system_clock;
 
-struct Options {
+struct CacheCommand {
     bool json = false;
     double olderDays = -1;
     std::string to;
@@ -68,7 +68,7 @@ nlohmann::json entryJson(const scene::CacheEntry& entry) {
     return j;
 }
 
-Result<void> list(const Options& o) {
+Result<void> list(const CacheCommand& o) {
     STIPPLE_ASSIGN(const uint64_t limit, scene::cacheLimit(""));
     const std::string folder = scene::CacheFolder::path();
     std::vector<scene::CacheEntry> entries;
@@ -96,7 +96,7 @@ Result<void> list(const Options& o) {
     return {};
 }
 
-Result<void> clean(const Options& o) {
+Result<void> clean(const CacheCommand& o) {
     std::vector<scene::CacheEntry> removed;
     uint64_t most = 0, kept = 0, bytes = 0;
     if (!o.to.empty()) {
@@ -128,7 +128,7 @@ Result<void> clean(const Options& o) {
 }  // namespace
 
 void setupCache(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<CacheCommand>();
     CLI::App* sub =
         app.add_subcommand("cache", "scenes built from raw inputs for render and view: list them, remove them");
     sub->require_subcommand(1);

@@ -10,13 +10,13 @@
 namespace stipple::app {
 namespace {
 
-struct Options {
+struct CompareCommand {
     std::string a, b, diff;
     int threshold = 4;
     bool json = false, force = false;
 };
 
-Result<void> run(const Options& o) {
+Result<void> run(const CompareCommand& o) {
     if (!o.diff.empty()) {
         STIPPLE_TRY(image::checkImagePath(o.diff));
         STIPPLE_TRY(checkOutputs({{o.diff, OutputKind::picture}}, {o.a, o.b}, o.force));
@@ -54,7 +54,7 @@ Result<void> run(const Options& o) {
 }  // namespace
 
 void setupCompare(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<CompareCommand>();
     CLI::App* sub = app.add_subcommand("compare", "how far picture A is from the reference B");
     sub->add_option("A", o->a, "a picture (.png, .exr)")->required();
     sub->add_option("B", o->b, "the reference")->required();

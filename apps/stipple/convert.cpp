@@ -18,7 +18,7 @@ namespace stipple::app {
 namespace {
 namespace fs = std::filesystem;
 
-struct Options {
+struct ConvertCommand {
     std::string input, output;
     bool curves = false, patches = false, json = false, force = false;
     PatchConversion asPatches;
@@ -88,7 +88,7 @@ struct Beside {
 };
 
 /// What belongs to the one is of no use to the other.
-Result<void> checkAsked(const Options& o, const CLI::App& sub) {
+Result<void> checkAsked(const ConvertCommand& o, const CLI::App& sub) {
     const bool isFormat = !o.curves && !o.patches && isWritten(o.output);
     if (o.curves == o.patches && !isFormat)
         return fail(
@@ -111,7 +111,7 @@ Result<void> checkAsked(const Options& o, const CLI::App& sub) {
     return {};
 }
 
-Result<void> run(const Options& o) {
+Result<void> run(const ConvertCommand& o) {
     if (!scene::isSceneFile(o.input))
         return fail(ErrorKind::usage, "is not read by convert, which takes polygon plants as .gltf, .glb or .obj",
                     o.input, "other files are drawn as they are: stipple render, stipple view");
@@ -186,7 +186,7 @@ Result<void> run(const Options& o) {
 }  // namespace
 
 void setupConvert(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ConvertCommand>();
     CLI::App* sub = app.add_subcommand("convert",
                                        "polygon plants to ribbons and tubes, scans and meshes to patches or "
                                        "to other formats");

@@ -18,13 +18,13 @@
 namespace stipple::app {
 namespace {
 
-struct Options {
+struct GrowCommand {
     std::string output, origin = "0,0,0";
     grow::ScanOptions scan;
     bool json = false, force = false;
 };
 
-Result<void> run(Options& o) {
+Result<void> run(GrowCommand& o) {
     STIPPLE_ASSIGN(const glm::dvec3 origin, parseVector(o.origin, "--origin"));
     o.scan.origin = {origin.x, origin.y, origin.z};
     STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
@@ -298,7 +298,7 @@ void addLandscape(CLI::App& parent, const char* kind, const char* what, int& sta
 }  // namespace
 
 void setupGrow(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<GrowCommand>();
     CLI::App* sub = app.add_subcommand("grow", "generate test scenes");
     sub->require_subcommand(1);
     CLI::App* scan = sub->add_subcommand("scan", "simulate a laser scan of a grove with rocks and a house");

@@ -8,7 +8,7 @@
 
 #include "apps/stipple/build_patches.h"
 #include "apps/stipple/common.h"
-#include "apps/stipple/info_input.h"
+#include "apps/stipple/info_parts.h"
 #include "apps/stipple/options.h"
 #include "engine/base/hash.h"
 #include "engine/base/numbers.h"
@@ -29,13 +29,11 @@
 namespace stipple::app {
 namespace {
 
-struct Options {
+struct InfoCommand {
     std::string input, at, against;
     bool verify = false, json = false, skipBad = false;
     BuildOptions build;  ///< of which reading scene files uses some
 };
-
-nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
 /// A place of the store's lattice: as its integers say, without what the sum of origin and steps added.
 nlohmann::json placeJson(const lod::Hierarchy& h, const glm::dvec3& v) {
@@ -345,7 +343,7 @@ void printStore(const nlohmann::json& j) {
         kept < 1 ? fmt::format("; of thin curves at the coarsest level 1 in {:.0f}, as much wider", 1 / kept) : "");
 }
 
-Result<void> showNearest(const lod::Store& store, const Options& o) {
+Result<void> showNearest(const lod::Store& store, const InfoCommand& o) {
     const bool isMixed = store.hierarchy.isMixed;
     if (isMixed || store.hierarchy.nodes[0].kind != lod::Kind::points)
         return fail(ErrorKind::usage,
@@ -377,7 +375,8 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
 }
 
 /// The finest patches against what they were made of.
-Result<void> measureAgainstSource(const lod::Store& store, const Options& o, Executor& executor, nlohmann::json& j) {
+Result<void> measureAgainstSource(const lod::Store& store, const InfoCommand& o, Executor& executor,
+                                  nlohmann::json& j) {
     constexpr uint64_t kPlaces = 200'000;
     STIPPLE_ASSIGN(const lod::AgainstSource r, [&]() -> Result<lod::AgainstSource> {
         if (o.build.onlyPoints || !hasTriangles(o.against)) {
@@ -402,7 +401,7 @@ Result<void> measureAgainstSource(const lod::Store& store, const Options& o, Exe
     return {};
 }
 
-Result<void> run(const Options& o) {
+Result<void> run(const InfoCommand& o) {
     catchStopSignals();
     if (!o.against.empty() && !(o.verify && lod::isStoreFile(o.input)))
         return fail(ErrorKind::usage, "is of built scenes of patches that are verified", "--against",
@@ -447,7 +446,7 @@ Result<void> run(const Options& o) {
 }  // namespace
 
 void setupInfo(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<InfoCommand>();
     CLI::App* sub = app.add_subcommand("info", "what a scene or an input file holds");
     sub->add_option("SCENE", o->input, "a .stipple scene, a scan, mesh, scene or curve file, or a folder of scans")
         ->required();

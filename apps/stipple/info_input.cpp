@@ -28,8 +28,6 @@ namespace {
 constexpr uint64_t kQuickPoints = 20'000'000;
 constexpr size_t kMostProblems = 20;
 
-nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
-
 /// As the integers of the file say, where it has some.
 nlohmann::json placeJson(const lod::SourceInfo& i, const glm::dvec3& v) {
     if (!i.isLattice) return vectorJson(v);

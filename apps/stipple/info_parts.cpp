@@ -28,6 +28,8 @@ std::string textOf(const lod::Fact& fact) {
 
 }  // namespace
 
+nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
 nlohmann::json factsJson(const std::vector<lod::Fact>& facts) {
     nlohmann::json j = nlohmann::json::object();
     for (const lod::Fact& fact : facts) {

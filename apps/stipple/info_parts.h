@@ -9,6 +9,8 @@ namespace stipple::app {
 
 Result<void> showParts(const InputInfoOptions& options, const lod::Format& format);
 
+/// [x, y, z].
+nlohmann::json vectorJson(const glm::dvec3& v);
 /// {"name": value, ...}, with names in lower case and _ for spaces.
 nlohmann::json factsJson(const std::vector<lod::Fact>& facts);
 

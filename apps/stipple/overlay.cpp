@@ -31,7 +31,7 @@ void beginPanel(const char* name, float x, float y) {
                      ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoFocusOnAppearing);
 }
 
-std::string counted(uint64_t count) {
+std::string roughly(uint64_t count) {
     const auto value = static_cast<double>(count);
     return count < 10'000      ? std::to_string(count)
            : count < 1'000'000 ? fmt::format("{:.0f} k", value * 1e-3)
@@ -43,10 +43,10 @@ std::string drawnText(const render::FrameState& state) {
     const FrameCounters& c = state.counters;
     const render::FrameContent content = render::contentOf(state.draws);
     const bool hasCurves = content.has(lod::Kind::curves), hasPoints = content.has(lod::Kind::points);
-    const std::string records = counted(c.recordsDrawn) + (!hasCurves   ? " points"
+    const std::string records = roughly(c.recordsDrawn) + (!hasCurves   ? " points"
                                                            : !hasPoints ? " segments"
                                                                         : " points and segments"),
-                      triangles = counted(c.trianglesDrawn) + " triangles";
+                      triangles = roughly(c.trianglesDrawn) + " triangles";
     return c.trianglesDrawn == 0 ? records : c.recordsDrawn == 0 ? triangles : records + ", " + triangles;
 }
 
@@ -87,7 +87,7 @@ void drawFull(const OverlayFacts& f) {
     line(fmt::format("{} nodes, {} missing, {} chunks on their way", c.nodesDrawn, c.nodesMissing, c.requestsInFlight));
     ImGui::ProgressBar(static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(budgets.records),
                        ImVec2(300 * unit(), 0),
-                       fmt::format("{} of {}", drawnText(f.state), counted(budgets.records)).c_str());
+                       fmt::format("{} of {}", drawnText(f.state), roughly(budgets.records)).c_str());
     line(fmt::format("resident {}", humanBytes(c.residentBytes)));
     line(fmt::format("debug view: {}   H: keys", kDebugNames.at(f.settings.frame.draw.debugView)));
 }

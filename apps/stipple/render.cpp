@@ -37,7 +37,7 @@
 namespace stipple::app {
 namespace {
 
-struct Options {
+struct RenderCommand {
     std::vector<std::string> inputs;
     std::string output, size = "1280x720", device = "auto", shade = "auto";
     std::string debug = "none", resident = "1G", transfer = "srgb";
@@ -63,12 +63,12 @@ bool closesGaps(const std::string& mode) {
     return !of || of->closesGaps;
 }
 
-image::PictureFormat formatOf(const Options& o) {
+image::PictureFormat formatOf(const RenderCommand& o) {
     return {o.alpha, o.transfer == "rec709" ? image::Transfer::rec709 : image::Transfer::srgb};
 }
 
 /// What can be found out before a scene is built, which may take hours.
-Result<void> checkArguments(const Options& o) {
+Result<void> checkArguments(const RenderCommand& o) {
     STIPPLE_TRY(o.camera.check());
     STIPPLE_TRY(o.exposure.check(o.camera, o.wind > 0));
     STIPPLE_TRY(o.material.check(o.shade));
@@ -89,7 +89,7 @@ Result<void> checkArguments(const Options& o) {
     return {};
 }
 
-Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDescription& d, const Shot& shot,
+Result<render::FrameSettings> makeSettings(const RenderCommand& o, const lod::StoreDescription& d, const Shot& shot,
                                            const lod::ColourBy& colour, const std::vector<render::WorldLight>& lights) {
     render::FrameSettings s;
     s.draw.lights = lights;
@@ -144,7 +144,7 @@ nlohmann::json countersJson(const FrameCounters& c) {
 }
 
 /// Before anything is read.
-Result<void> checkPictures(const Options& o) {
+Result<void> checkPictures(const RenderCommand& o) {
     STIPPLE_TRY(image::checkImagePath(o.output));
     std::vector<std::string> inputs = o.inputs;
     inputs.insert(inputs.end(), {o.camera.path, o.environment.path});
@@ -158,7 +158,7 @@ Result<void> checkPictures(const Options& o) {
 }
 
 /// Before any work. (It takes longer to load than a built scene takes to draw: then only whether it is there.)
-Result<void> checkModule(const Options& o) {
+Result<void> checkModule(const RenderCommand& o) {
     const bool isLong =
         !o.camera.path.empty() || o.camera.orbit > 0 || !o.exposure.isPlain() || o.drawn.mode == "reference";
     return image::checkModule(isLong || !lod::isStoreFile(o.inputs.front()));
@@ -184,7 +184,7 @@ std::string errorText(const Verdict& verdict, const std::string& mode) {
 }
 
 /// `--mode reference`: rays against the full detail.
-Result<void> runTraced(const Options& o, const OpenedScene& scene, const Shot& shot,
+Result<void> runTraced(const RenderCommand& o, const OpenedScene& scene, const Shot& shot,
                        const render::FrameSettings& settings, const Legend& legend, Executor& executor,
                        Written& written) {
     const reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
@@ -260,7 +260,7 @@ std::string drawnText(const render::FrameState& state, const ModeOptions& drawn)
 }
 
 /// The result, as text or JSON.
-void tell(const Options& o, const render::FrameState& state, const render::DrawSettings& settings,
+void tell(const RenderCommand& o, const render::FrameState& state, const render::DrawSettings& settings,
           const Verdict& verdict, const Timings& timings, const glm::uvec2& size, const Written& written) {
     const size_t views = written.of;
     const FrameCounters& c = state.counters;
@@ -325,13 +325,13 @@ void sayShadows(const render::FrameState& state) {
                    left, shared::kMostShadowLights);
 }
 
-Result<void> checkWeights(const Options& o, const OpenedScene& scene) {
+Result<void> checkWeights(const RenderCommand& o, const OpenedScene& scene) {
     if (o.drawn.normalise != "surfel" || scene::hasSurfelWeights(scene.placed)) return {};
     return fail(ErrorKind::usage, "no store of the scene has weights of surfels", "--normalise surfel",
                 "build it with: stipple build --surfel-weights, or take --normalise pixel");
 }
 
-Result<void> run(const Options& o, Written& written) {
+Result<void> run(const RenderCommand& o, Written& written) {
     catchStopSignals();
     STIPPLE_TRY(checkPictures(o));
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
@@ -393,7 +393,7 @@ Result<void> run(const Options& o, Written& written) {
 }
 
 /// Wherever it was interrupted: what is there now.
-Error toldOf(Error error, const Options& o, const Written& written) {
+Error toldOf(Error error, const RenderCommand& o, const Written& written) {
     if (error.kind != ErrorKind::interrupted) return error;
     error.where = o.output;
     if (error.hint == "nothing was written") error.hint.clear();  // of a build inside
@@ -404,7 +404,7 @@ Error toldOf(Error error, const Options& o, const Written& written) {
 }
 
 /// How inputs that are not built yet are built.
-void addReading(CLI::App& sub, Options& o) {
+void addReading(CLI::App& sub, RenderCommand& o) {
     addUpOption(sub, o.build.up);
     sub.add_option("--memory", o.build.memory, "memory that the build may use, bytes (stipple help budgets)")
         ->check(bytes())
@@ -433,7 +433,7 @@ void addReading(CLI::App& sub, Options& o) {
 }
 
 /// What is behind the scene, and how colours are written.
-void addPictureTo(CLI::App& sub, Options& o) {
+void addPictureTo(CLI::App& sub, RenderCommand& o) {
     sub.add_flag("--alpha", o.alpha, "no background: how much of a pixel is covered goes into the alpha channel")
         ->excludes(o.background.addTo(sub));
     sub.add_option("--transfer", o.transfer, "how colours of a .png are encoded, which it says itself")
@@ -444,7 +444,7 @@ void addPictureTo(CLI::App& sub, Options& o) {
 }  // namespace
 
 void setupRender(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<RenderCommand>();
     CLI::App* sub = app.add_subcommand("render", "draw pictures without a window");
     sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans, meshes, curves (built into the cache first)")
         ->required();

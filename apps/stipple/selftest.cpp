@@ -16,7 +16,7 @@
 namespace stipple::app {
 namespace {
 
-struct Options {
+struct SelfTestCommand {
     std::string device = "all";
     int threads = 0;
     bool json = false, quiet = false;
@@ -45,7 +45,7 @@ class OwnFolder {
     bool isThere_ = false;
 };
 
-Result<void> runSelfTestCommand(const Options& o, int& status) {
+Result<void> runSelfTestCommand(const SelfTestCommand& o, int& status) {
     catchStopSignals();
     const OwnFolder folder;
     if (!folder.isThere())
@@ -73,7 +73,7 @@ Result<void> runSelfTestCommand(const Options& o, int& status) {
 }  // namespace
 
 void setupSelfTest(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<SelfTestCommand>();
     CLI::App* sub = app.add_subcommand("selftest", "hard cases of precision, on this machine and its devices");
     sub->add_option("--device", o->device, "all (cpu, and gpu if there is one), cpu, gpu or gpu:NAME")
         ->type_name("DEVICE")

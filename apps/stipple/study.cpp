@@ -14,7 +14,7 @@
 namespace stipple::app {
 namespace {
 
-struct Options {
+struct StudyCommand {
     StudyOptions scenes;
     std::string data;
     bool seeds = false;
@@ -22,7 +22,7 @@ struct Options {
 };
 
 /// What each of the two studies has and the other would ignore.
-Result<void> checkOptions(const CLI::App& sub, const Options& o) {
+Result<void> checkOptions(const CLI::App& sub, const StudyCommand& o) {
     if (!o.seeds && o.scenes.scenes.empty())
         return fail(ErrorKind::usage, "says what is to be studied, and is missing", "SCENE",
                     "stipple study SCENE -o FOLDER, or stipple study --seeds -o FOLDER");
@@ -44,7 +44,7 @@ Result<void> checkOptions(const CLI::App& sub, const Options& o) {
     return {};
 }
 
-Result<void> runSeeds(const Options& all) {
+Result<void> runSeeds(const StudyCommand& all) {
     const StudyOptions& o = all.scenes;
     catchStopSignals();
     STIPPLE_TRY(image::checkModule(true));
@@ -68,7 +68,7 @@ Result<void> runSeeds(const Options& all) {
 }  // namespace
 
 void setupStudy(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<StudyCommand>();
     StudyOptions& scenes = o->scenes;
     CLI::App* sub = app.add_subcommand("study", "what accuracy costs in time, on your scenes");
     sub->add_flag("--seeds", o->seeds, "the tables and figures of the papers that the modes stand on, made again");

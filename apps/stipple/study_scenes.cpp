@@ -97,7 +97,7 @@ Result<study::StudySettings> settingsOf(const StudyOptions& o) {
 }
 
 /// Before scenes are built, which may take hours.
-Result<void> checkFolder(const std::string& folder) {
+Result<void> checkCanBeMade(const std::string& folder) {
     fs::path there = fs::absolute(folder);
     std::error_code error;
     while (!fs::exists(there, error) && there.has_parent_path() && there != there.parent_path())
@@ -244,7 +244,7 @@ Result<void> runSceneStudy(const StudyOptions& o) {
     if (!o.path.empty()) STIPPLE_TRY(InputFile::open(o.path));
     if (!o.against.empty() && (o.scenes.size() != 1 || !o.builds.empty()))
         return fail(ErrorKind::usage, "is of studies of one scene", "--against", "give one SCENE and no --builds");
-    STIPPLE_TRY(checkFolder(o.output));
+    STIPPLE_TRY(checkCanBeMade(o.output));
     STIPPLE_TRY(image::checkModule(true));
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const auto backend, makeBackend(o.device, *executor));
