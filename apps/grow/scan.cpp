@@ -1,9 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/glm.hpp>
-#include <thread>
+#include <limits>
 
 #include "apps/grow/grow.h"
+#include "engine/base/box_tree.h"
 #include "engine/base/executor.h"
 #include "engine/base/process.h"
 #include "engine/base/rng.h"
@@ -14,20 +16,31 @@ namespace {
 using glm::dvec3;
 
 constexpr double kExtent = 30;  ///< metres, half
+constexpr size_t kLanes = 16;   ///< rays side by side that look for the ground together
+using Lanes = std::array<double, kLanes>;
 constexpr double kMaximumRange = 60;
 
-/// Smooth value noise in [-1, 1]; a hash of the cell's corners.
+/// Of a corner of a cell of noise, in [-1, 1].
+double cornerOf(int64_t x, int64_t y, uint64_t seed) {
+    Rng rng(seed ^ static_cast<uint64_t>(x) * 0x9e3779b1u ^ static_cast<uint64_t>(y) * 0x85ebca6bull << 20);
+    rng.next();
+    return rng.uniform(-1, 1);
+}
+[[gnu::always_inline]] inline int32_t floorOf(double v) {
+    const auto whole = static_cast<int32_t>(v);
+    return whole - (static_cast<double>(whole) > v ? 1 : 0);
+}
+/// Smooth value noise in [-1, 1]: corner(x, y) of the cell's corners.
+template <typename Corner>
+[[gnu::always_inline]] inline double noiseOf(double x, double y, const Corner& corner) {
+    const int32_t cx = floorOf(x), cy = floorOf(y);
+    const double u = x - static_cast<double>(cx), v = y - static_cast<double>(cy), su = u * u * (3 - 2 * u),
+                 sv = v * v * (3 - 2 * v);
+    return glm::mix(glm::mix(corner(cx, cy), corner(cx + 1, cy), su),
+                    glm::mix(corner(cx, cy + 1), corner(cx + 1, cy + 1), su), sv);
+}
 double noise(double x, double y, uint64_t seed) {
-    const double fx = std::floor(x), fy = std::floor(y);
-    const auto corner = [&](double cx, double cy) {
-        Rng rng(seed ^ static_cast<uint64_t>(static_cast<int64_t>(cx)) * 0x9e3779b1u ^
-                static_cast<uint64_t>(static_cast<int64_t>(cy)) * 0x85ebca6bull << 20);
-        rng.next();
-        return rng.uniform(-1, 1);
-    };
-    const double u = x - fx, v = y - fy, su = u * u * (3 - 2 * u), sv = v * v * (3 - 2 * v);
-    return glm::mix(glm::mix(corner(fx, fy), corner(fx + 1, fy), su),
-                    glm::mix(corner(fx, fy + 1), corner(fx + 1, fy + 1), su), sv);
+    return noiseOf(x, y, [seed](int32_t cx, int32_t cy) { return cornerOf(cx, cy, seed); });
 }
 double fractal(double x, double y, uint64_t seed, int octaves) {
     double sum = 0, amplitude = 1;
@@ -35,6 +48,69 @@ double fractal(double x, double y, uint64_t seed, int octaves) {
         sum += amplitude * noise(x, y, seed + static_cast<uint64_t>(i));
     return sum;
 }
+
+/// The same of one place's surroundings, whose corners are kept: rays ask for them again and again.
+class KeptFractal {
+  public:
+    /// Of places up to `reach` from the origin, times `scale`.
+    KeptFractal(double scale, uint64_t seed, int octaves, double reach) : scale_(scale) {
+        double edge = reach * scale;
+        for (int i = 0; i < octaves; ++i, edge *= 2.03) {
+            Octave& o = octaves_.emplace_back();
+            o.least = floorOf(-edge) - 1;
+            o.count = floorOf(edge) + 3 - o.least;
+            for (int32_t y = 0; y < o.count; ++y)
+                for (int32_t x = 0; x < o.count; ++x)
+                    o.corners.push_back(cornerOf(o.least + x, o.least + y, seed + static_cast<uint64_t>(i)));
+        }
+    }
+    double operator()(double x, double y) const {
+        x *= scale_;
+        y *= scale_;
+        double sum = 0, amplitude = 1;
+        for (const Octave& o : octaves_) {
+            sum += amplitude * noiseOf(x, y, o);
+            amplitude *= 0.5;
+            x *= 2.03;
+            y *= 2.03;
+        }
+        return sum;
+    }
+    /// The same of several places side by side, times `share`, added to `out`.
+    [[gnu::always_inline]] void addTo(Lanes x, Lanes y, double share, Lanes& out) const {
+        Lanes sum{};
+        for (size_t i = 0; i < kLanes; ++i) {
+            x[i] *= scale_;
+            y[i] *= scale_;
+        }
+        double amplitude = 1;
+        for (const Octave& o : octaves_) {
+            const auto corner = [ at = o.corners.data(), least = o.least, count = o.count ](int32_t cx, int32_t cy)
+                __attribute__((always_inline)) {
+                return at[(cy - least) * count + (cx - least)];
+            };
+#pragma GCC ivdep
+            for (size_t i = 0; i < kLanes; ++i) {
+                sum[i] += amplitude * noiseOf(x[i], y[i], corner);
+                x[i] *= 2.03;
+                y[i] *= 2.03;
+            }
+            amplitude *= 0.5;
+        }
+        for (size_t i = 0; i < kLanes; ++i) out[i] += share * sum[i];
+    }
+
+  private:
+    struct Octave {
+        int32_t least = 0, count = 0;
+        std::vector<double> corners;  ///< from (least, least) on, row by row
+        double operator()(int32_t cx, int32_t cy) const {
+            return corners[static_cast<size_t>((cy - least) * count + (cx - least))];
+        }
+    };
+    double scale_;
+    std::vector<Octave> octaves_;
+};
 
 struct Hit {
     double t = kMaximumRange;
@@ -57,10 +133,14 @@ struct Leaf {
     double radius;
 };
 
-/// Everything that is not the ground, in a uniform grid over the plan.
+/// The ground, a house, and all else in a tree of boxes.
 class Scene {
   public:
-    explicit Scene(uint64_t seed) : seed_(seed) {
+    explicit Scene(uint64_t seed)
+        : seed_(seed),
+          hills_(0.06, seed, 4, kExtent + 1),
+          tufts_(1.7, seed + 9, 2, kExtent + 1),
+          earth_(0.3, seed + 5, 3, kExtent + 1) {
         Rng rng(seed);
         for (int i = 0; i < 14; ++i) {
             const double x = rng.uniform(-20, 20), y = rng.uniform(-20, 20), r = rng.uniform(0.3, 1.1);
@@ -74,24 +154,39 @@ class Scene {
             } while (x > 2 && x < 15 && y > 2 && y < 13);  // not in the house
             plantTree(rng, {x, y, ground(x, y) - 0.1}, rng.uniform(6, 10));
         }
-        grid_.resize(size_t{kCells} * kCells);
-        for (uint32_t i = 0; i < spheres_.size(); ++i) insert(spheres_[i].centre, spheres_[i].radius, i, 0);
-        for (uint32_t i = 0; i < cones_.size(); ++i)
-            insert(0.5 * (cones_[i].a + cones_[i].b), 0.5 * glm::length(cones_[i].b - cones_[i].a) + cones_[i].ra, i,
-                   1);
-        for (uint32_t i = 0; i < leaves_.size(); ++i) insert(leaves_[i].centre, leaves_[i].radius, i, 2);
+        std::vector<Box> boxes;
+        const auto insert = [&](const dvec3& c, double r) {
+            constexpr double kRounding = 1e-9;
+            boxes.push_back({c - (r + kRounding), c + (r + kRounding)});
+        };
+        for (const Sphere& s : spheres_) insert(s.centre, s.radius);
+        for (const Cone& k : cones_) insert(0.5 * (k.a + k.b), 0.5 * glm::length(k.b - k.a) + k.ra);
+        for (const Leaf& l : leaves_) insert(l.centre, l.radius);
+        tree_ = BoxTree(boxes);
     }
 
-    double ground(double x, double y) const {
-        return 1.1 * fractal(x * 0.06, y * 0.06, seed_, 4) + 0.03 * fractal(x * 1.7, y * 1.7, seed_ + 9, 2);
+    /// At most a metre beyond kExtent.
+    double ground(double x, double y) const { return 1.1 * hills_(x, y) + 0.03 * tufts_(x, y); }
+
+    [[gnu::always_inline]] void groundLanes(const Lanes& x, const Lanes& y, Lanes& out) const {
+        out = {};
+        hills_.addTo(x, y, 1.1, out);
+        tufts_.addTo(x, y, 0.03, out);
     }
 
-    Hit trace(const dvec3& o, const dvec3& d) const {
+    /// All but the ground.
+    Hit traceThings(const dvec3& o, const dvec3& d) const {
         Hit hit;
         traceHouse(o, d, hit);
-        traceGrid(o, d, hit);
-        traceGround(o, d, hit);
+        traceTree(o, d, hit);
         return hit;
+    }
+    Hit groundAt(double t, const dvec3& q) const {
+        const double e = 0.05;
+        return {t,
+                glm::normalize(dvec3(ground(q.x - e, q.y) - ground(q.x + e, q.y),
+                                     ground(q.x, q.y - e) - ground(q.x, q.y + e), 2 * e)),
+                0, 0};
     }
 
     dvec3 colourAt(const Hit& hit, const dvec3& p) const {
@@ -100,7 +195,7 @@ class Scene {
         switch (hit.material) {
             case 0:
                 c = glm::mix(dvec3(0.25, 0.33, 0.12), dvec3(0.42, 0.34, 0.22),
-                             std::clamp(0.5 + 0.6 * fractal(p.x * 0.3, p.y * 0.3, seed_ + 5, 3), 0.0, 1.0));
+                             std::clamp(0.5 + 0.6 * earth_(p.x, p.y), 0.0, 1.0));
                 break;
             case 1:
                 c = dvec3(0.45, 0.44, 0.42);
@@ -123,9 +218,6 @@ class Scene {
     }
 
   private:
-    static constexpr int kCells = 120;
-    static constexpr double kCell = 2 * kExtent / kCells;
-
     void plantTree(Rng& rng, const dvec3& foot, double height) {
         dvec3 at = foot;
         double radius = height * 0.028;
@@ -151,46 +243,9 @@ class Scene {
         }
     }
 
-    void insert(const dvec3& c, double r, uint32_t index, uint32_t kind) {
-        const auto cell = [](double v) { return std::clamp(static_cast<int>((v + kExtent) / kCell), 0, kCells - 1); };
-        for (int y = cell(c.y - r); y <= cell(c.y + r); ++y)
-            for (int x = cell(c.x - r); x <= cell(c.x + r); ++x)
-                grid_[static_cast<size_t>(y) * kCells + static_cast<size_t>(x)].push_back(index << 2 | kind);
-    }
-
     static bool windowAt(const dvec3& p) {
         const double u = std::fmod(std::abs(p.x) + std::abs(p.y), 2.5);
         return p.z > 1.4 && p.z < 2.6 && u > 0.8 && u < 1.8;
-    }
-
-    void traceGround(const dvec3& o, const dvec3& d, Hit& hit) const {
-        double t = 0.5;
-        double above = o.z + d.z * t - ground(o.x + d.x * t, o.y + d.y * t);
-        while (t < hit.t) {
-            const double step = std::max(0.02, 0.4 * above);
-            const double next = t + step;
-            const dvec3 p = o + next * d;
-            if (std::abs(p.x) > kExtent || std::abs(p.y) > kExtent) return;
-            const double nextAbove = p.z - ground(p.x, p.y);
-            if (nextAbove < 0) {
-                double lo = t, hi = next;
-                for (int i = 0; i < 24; ++i) {
-                    const double m = 0.5 * (lo + hi);
-                    const dvec3 q = o + m * d;
-                    (q.z < ground(q.x, q.y) ? hi : lo) = m;
-                }
-                if (hi >= hit.t) return;
-                const dvec3 q = o + hi * d;
-                const double e = 0.05;
-                hit = {hi,
-                       glm::normalize(dvec3(ground(q.x - e, q.y) - ground(q.x + e, q.y),
-                                            ground(q.x, q.y - e) - ground(q.x, q.y + e), 2 * e)),
-                       0, 0};
-                return;
-            }
-            t = next;
-            above = nextAbove;
-        }
     }
 
     void traceHouse(const dvec3& o, const dvec3& d, Hit& hit) const {
@@ -204,7 +259,7 @@ class Scene {
         }
         // Two roof planes over the ridge y = 7.5.
         for (const double side : {-1.0, 1.0}) {
-            const dvec3 n = glm::normalize(dvec3(0, side, 1.1));
+            const dvec3& n = side < 0 ? roof_[0] : roof_[1];
             const double t = glm::dot(dvec3(8.5, 7.5, 6.6) - o, n) / glm::dot(d, n);
             const dvec3 p = o + t * d;
             if (t > 0 && t < hit.t && p.x > 3.6 && p.x < 13.4 && (p.y - 7.5) * side > 0 && (p.y - 7.5) * side < 3.9)
@@ -218,34 +273,17 @@ class Scene {
         }
     }
 
-    void traceGrid(const dvec3& o, const dvec3& d, Hit& hit) const {
-        // Walk the plan's cells (Amanatides and Woo).
-        int x = static_cast<int>(std::floor((o.x + kExtent) / kCell)),
-            y = static_cast<int>(std::floor((o.y + kExtent) / kCell));
-        const int stepX = d.x > 0 ? 1 : -1, stepY = d.y > 0 ? 1 : -1;
-        const double deltaX = kCell / std::max(1e-12, std::abs(d.x)), deltaY = kCell / std::max(1e-12, std::abs(d.y));
-        double nextX = ((x + (stepX > 0)) * kCell - kExtent - o.x) / d.x,
-               nextY = ((y + (stepY > 0)) * kCell - kExtent - o.y) / d.y;
-        double t = 0;
-        while (x >= 0 && y >= 0 && x < kCells && y < kCells && t < hit.t) {
-            for (const uint32_t item : grid_[static_cast<size_t>(y) * kCells + static_cast<size_t>(x)]) {
-                if ((item & 3u) == 0)
-                    traceSphere(spheres_[item >> 2], o, d, hit);
-                else if ((item & 3u) == 1)
-                    traceCone(cones_[item >> 2], o, d, hit);
-                else
-                    traceLeaf(item >> 2, o, d, hit);
-            }
-            if (nextX < nextY) {
-                t = nextX;
-                nextX += deltaX;
-                x += stepX;
-            } else {
-                t = nextY;
-                nextY += deltaY;
-                y += stepY;
-            }
-        }
+    void traceTree(const dvec3& o, const dvec3& d, Hit& hit) const {
+        const auto spheres = static_cast<uint32_t>(spheres_.size()),
+                   cones = spheres + static_cast<uint32_t>(cones_.size());
+        tree_.visit(o, d, 0, hit.t, [&](uint32_t item) {
+            if (item < spheres)
+                traceSphere(spheres_[item], o, d, hit);
+            else if (item < cones)
+                traceCone(cones_[item - spheres], o, d, hit);
+            else
+                traceLeaf(item - cones, o, d, hit);
+        });
     }
 
     static void traceSphere(const Sphere& s, const dvec3& o, const dvec3& d, Hit& hit) {
@@ -278,7 +316,159 @@ class Scene {
     std::vector<Sphere> spheres_;
     std::vector<Cone> cones_;
     std::vector<Leaf> leaves_;
-    std::vector<std::vector<uint32_t>> grid_;
+    const std::array<dvec3, 2> roof_{glm::normalize(dvec3(0, -1, 1.1)), glm::normalize(dvec3(0, 1, 1.1))};
+    BoxTree tree_;  ///< spheres, cones and leaves, one after another
+    KeptFractal hills_, tufts_, earth_;
+};
+
+/// How high the ground is under places of rays.
+struct Soundings {
+    Lanes x{}, y{};  ///< directions
+    Lanes t{}, height{};
+};
+[[gnu::always_inline]] inline void sound(const Scene& scene, const dvec3& o, Soundings& s) {
+    Lanes x, y;
+    for (size_t i = 0; i < kLanes; ++i) {
+        x[i] = std::min(std::max(o.x + s.t[i] * s.x[i], -kExtent), kExtent);
+        y[i] = std::min(std::max(o.y + s.t[i] * s.y[i], -kExtent), kExtent);
+    }
+    scene.groundLanes(x, y, s.height);
+}
+using Sound = void (*)(const Scene& scene, const dvec3& o, Soundings& s);
+void soundAnywhere(const Scene& scene, const dvec3& o, Soundings& s) { sound(scene, o, s); }
+#if defined(__x86_64__)
+[[gnu::target("avx2")]] void soundByFours(const Scene& scene, const dvec3& o, Soundings& s) { sound(scene, o, s); }
+[[gnu::target("avx512f,avx512dq,avx512vl")]] void soundByEights(const Scene& scene, const dvec3& o, Soundings& s) {
+    sound(scene, o, s);
+}
+/// By the widest vectors that this machine has; the numbers are the same.
+Sound widestSound() {
+    if (__builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0) return soundByEights;
+    return __builtin_cpu_supports("avx2") != 0 ? soundByFours : soundAnywhere;
+}
+#else
+Sound widestSound() { return soundAnywhere; }
+#endif
+
+/// A ray on its way to the ground: in steps until it is below, then the last one is halved.
+class GroundSearch {
+  public:
+    GroundSearch() = default;
+    GroundSearch(const dvec3& o, const dvec3& d, double limit) : o_(o), d_(d), limit_(limit) {}
+    /// Where the ground is asked for next.
+    double next() const {
+        return phase_ == Phase::starts    ? from_
+               : phase_ == Phase::marches ? from_ + std::max(0.02, 0.4 * above_)
+                                          : 0.5 * (from_ + to_);
+    }
+    /// `height`: of the ground there. True: it is over.
+    bool take(double t, double height) {
+        const dvec3 p = o_ + t * d_;
+        if (phase_ == Phase::halves) {
+            (p.z < height ? to_ : from_) = t;
+            return --left_ == 0;
+        }
+        const double above = p.z - height;
+        if (phase_ == Phase::marches) {
+            if (std::abs(p.x) > kExtent || std::abs(p.y) > kExtent) return true;
+            if (above < 0) {
+                to_ = t;
+                phase_ = Phase::halves;
+                return false;
+            }
+        }
+        phase_ = Phase::marches;
+        from_ = t;
+        above_ = above;
+        return !(t < limit_);
+    }
+    /// Once it is over; not below the limit: there is none.
+    double found() const { return left_ == 0 ? to_ : std::numeric_limits<double>::infinity(); }
+
+  private:
+    enum class Phase : uint8_t { starts, marches, halves };
+    dvec3 o_{0}, d_{0};
+    double limit_ = 0, from_ = 0.5, to_ = 0, above_ = 0;
+    int left_ = 24;
+    Phase phase_ = Phase::starts;
+};
+
+/// Rows of rays from one place, one per elevation. Each has its own generator, so that rows can run in parallel, and
+/// side by side: each in a lane, at its own pace.
+class RowCaster {
+  public:
+    RowCaster(const Scene& scene, const ScanOptions& options, const dvec3& o, int position, uint64_t rows,
+              uint64_t columns)
+        : scene_(scene), options_(options), o_(o), position_(position), rows_(rows), columns_(columns) {}
+
+    void cast(uint64_t first, std::vector<ScanPoint>* out) {
+        const size_t count = std::min<uint64_t>(kLanes, rows_ - first);
+        Soundings s;
+        size_t onTheirWay = count;
+        for (size_t i = 0; i < count; ++i) {
+            const uint64_t row = first + i;
+            Lane& lane = lanes_[i];
+            lane.rng = Rng(options_.seed * 1315423911u + static_cast<uint64_t>(position_) * 2654435761u + row);
+            const double elevation =
+                (-60.0 + 130.0 * (static_cast<double>(row) + 0.5) / static_cast<double>(rows_)) * 0.017453292519943295;
+            lane.level = std::cos(elevation);
+            lane.rise = std::sin(elevation);
+            begin(lane);
+        }
+        while (onTheirWay > 0) {
+            for (size_t i = 0; i < count; ++i) {
+                s.x[i] = lanes_[i].direction.x;
+                s.y[i] = lanes_[i].direction.y;
+                s.t[i] = lanes_[i].search.next();
+            }
+            sound_(scene_, o_, s);
+            for (size_t i = 0; i < count; ++i) {
+                Lane& lane = lanes_[i];
+                if (lane.column == columns_ || !lane.search.take(s.t[i], s.height[i])) continue;
+                finish(lane, out[i]);
+                if (++lane.column < columns_)
+                    begin(lane);
+                else
+                    --onTheirWay;
+            }
+        }
+    }
+
+  private:
+    struct Lane {
+        Rng rng{0};
+        double level = 0, rise = 0;  ///< cosine and sine of the elevation
+        uint64_t column = 0;
+        dvec3 direction{0};
+        Hit hit;
+        GroundSearch search;
+    };
+    void begin(Lane& lane) const {
+        const double azimuth = 6.283185307179586 * (static_cast<double>(lane.column) + lane.rng.uniform(-0.05, 0.05)) /
+                               static_cast<double>(columns_);
+        lane.direction = {std::cos(azimuth) * lane.level, std::sin(azimuth) * lane.level, lane.rise};
+        lane.hit = scene_.traceThings(o_, lane.direction);
+        lane.search = {o_, lane.direction, lane.hit.t};
+    }
+    void finish(Lane& lane, std::vector<ScanPoint>& out) const {
+        Hit& hit = lane.hit;
+        const double t = lane.search.found();
+        if (t < hit.t) hit = scene_.groundAt(t, o_ + t * lane.direction);
+        if (hit.material < 0) return;
+        const dvec3 p = o_ + (hit.t + options_.noiseMetres * lane.rng.normal()) * lane.direction;
+        const dvec3 colour = glm::clamp(scene_.colourAt(hit, o_ + hit.t * lane.direction) * 255.0 + 0.5, 0.0, 255.0);
+        out.push_back(
+            {{p.x, p.y, p.z},
+             {static_cast<uint8_t>(colour.x), static_cast<uint8_t>(colour.y), static_cast<uint8_t>(colour.z)}});
+    }
+
+    const Scene& scene_;
+    const ScanOptions& options_;
+    dvec3 o_;
+    int position_;
+    uint64_t rows_, columns_;
+    Sound sound_ = widestSound();
+    std::array<Lane, kLanes> lanes_;
 };
 
 }  // namespace
@@ -291,34 +481,19 @@ std::vector<ScanPoint> growScan(const ScanOptions& options) {
         const double x = r * std::cos(a) - 2, y = r * std::sin(a) - 2;
         return dvec3(x, y, scene.ground(x, y) + 1.7);
     };
-    // One row of rays per elevation; each row has its own generator, so rows can run in parallel.
-    const auto castRow = [&](int s, uint64_t row, uint64_t rows, uint64_t columns, std::vector<ScanPoint>& out) {
-        const dvec3 o = scanner(s);
-        Rng rng(options.seed * 1315423911u + static_cast<uint64_t>(s) * 2654435761u + row);
-        const double elevation =
-            (-60.0 + 130.0 * (static_cast<double>(row) + 0.5) / static_cast<double>(rows)) * 0.017453292519943295;
-        for (uint64_t c = 0; c < columns; ++c) {
-            const double azimuth =
-                6.283185307179586 * (static_cast<double>(c) + rng.uniform(-0.05, 0.05)) / static_cast<double>(columns);
-            const dvec3 d(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
-                          std::sin(elevation));
-            const Hit hit = scene.trace(o, d);
-            if (hit.material < 0) continue;
-            const dvec3 p = o + (hit.t + options.noiseMetres * rng.normal()) * d;
-            const dvec3 colour = glm::clamp(scene.colourAt(hit, o + hit.t * d) * 255.0 + 0.5, 0.0, 255.0);
-            out.push_back(
-                {{p.x, p.y, p.z},
-                 {static_cast<uint8_t>(colour.x), static_cast<uint8_t>(colour.y), static_cast<uint8_t>(colour.z)}});
-        }
-    };
     const double aspect = 360.0 / 130.0;
     const auto castAll = [&](uint64_t rows, std::vector<ScanPoint>& out) {
         const auto columns = static_cast<uint64_t>(static_cast<double>(rows) * aspect);
         std::vector<std::vector<ScanPoint>> parts(rows * static_cast<uint64_t>(positions));
         const auto executor = makeTbbExecutor(0);
-        executor->parallelFor(parts.size(), 4, [&](size_t begin, size_t end) {
-            for (size_t i = begin; i < end && !isStopRequested(); ++i)
-                castRow(static_cast<int>(i / rows), i % rows, rows, columns, parts[i]);
+        const uint64_t groups = (rows + kLanes - 1) / kLanes;
+        executor->parallelFor(groups * static_cast<uint64_t>(positions), 1, [&](size_t begin, size_t end) {
+            for (size_t i = begin; i < end && !isStopRequested(); ++i) {
+                const uint64_t first = i % groups * kLanes;
+                const auto position = static_cast<int>(i / groups);
+                RowCaster(scene, options, scanner(position), position, rows, columns)
+                    .cast(first, &parts[i / groups * rows + first]);
+            }
         });
         for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());
     };

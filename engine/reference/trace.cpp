@@ -4,9 +4,9 @@
 #include <limits>
 #include <map>
 
+#include "engine/base/box_tree.h"
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
-#include "engine/reference/box_tree.h"
 #include "engine/reference/curve_rays.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/decode_map.h"

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <vector>
 
-namespace stipple::reference {
+namespace stipple {
 
 struct Box {
     glm::dvec3 lo{std::numeric_limits<double>::max()}, hi{std::numeric_limits<double>::lowest()};
@@ -88,4 +88,4 @@ class BoxTree {
     std::vector<Node> nodes_;
 };
 
-}  // namespace stipple::reference
+}  // namespace stipple
