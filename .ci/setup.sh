@@ -34,10 +34,21 @@ install_packages() {
     DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# build_program TARGET: for ./run: what is not compiled keeps nobody waiting, tests are not there.
+all_kernels='sse;avx2;avx512'
+# build_program: what the first picture needs on this machine: what is not compiled keeps nobody waiting.
 build_program() {
-    [ -f build/build.ninja ] || configure release -DBUILD_TESTING=OFF -DCMAKE_UNITY_BUILD=ON || return 1
-    compile build --target "$1"
+    local kernels=sse
+    grep -qs avx2 /proc/cpuinfo && kernels=avx2
+    grep -qs 'avx512bw.*avx512vl' /proc/cpuinfo && kernels=avx512
+    [ -f build/build.ninja ] ||
+        configure release -DBUILD_TESTING=OFF -DCMAKE_UNITY_BUILD=ON -DSTIPPLE_KERNELS=$kernels || return 1
+    compile build --target stipple
+}
+# build_rest: for any machine, with the reader of OpenVDB files and the library for other programs.
+build_rest() {
+    grep -qs "^STIPPLE_KERNELS:STRING=$all_kernels" build/CMakeCache.txt ||
+        configure release -DSTIPPLE_KERNELS="$all_kernels" || return 1
+    compile build
 }
 
 # build_preset PRESET: all of it, with the tests.
@@ -45,7 +56,7 @@ build_preset() {
     local folder=build-$1
     [ "$1" = release ] && folder=build
     if [ ! -f "$folder/build.ninja" ] || grep -q '^BUILD_TESTING:BOOL=OFF' "$folder/CMakeCache.txt"; then
-        configure "$1" -DBUILD_TESTING=ON $([ "$1" = release ] && echo -DCMAKE_UNITY_BUILD=ON) || return 1
+        configure "$1" -DBUILD_TESTING=ON -DSTIPPLE_KERNELS="$all_kernels" $([ "$1" = release ] && echo -DCMAKE_UNITY_BUILD=ON) || return 1
     fi
     compile "$folder"
 }

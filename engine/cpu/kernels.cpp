@@ -1,30 +1,44 @@
 #include "engine/cpu/kernels.h"
 
+#include <array>
 #include <cstdlib>
 #include <string>
 
+#include "engine/base/check.h"
+
 namespace stipple::cpu {
 
-#if defined(__x86_64__)
 extern const Kernels kernels_sse, kernels_avx2, kernels_avx512;
-#else
-extern const Kernels kernels_sse;
+
+namespace {
+
+/// Those that were compiled, of a processor that has them; the best comes last.
+struct List {
+    std::array<const Kernels*, 3> items{};
+    size_t count = 0;
+    List() {
+#if defined(__x86_64__)
+        __builtin_cpu_init();
 #endif
+#if defined(STIPPLE_HAS_SSE)
+        items.at(count++) = &kernels_sse;
+#endif
+#if defined(STIPPLE_HAS_AVX2)
+        if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) items.at(count++) = &kernels_avx2;
+#endif
+#if defined(STIPPLE_HAS_AVX512)
+        if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+            __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
+            items.at(count++) = &kernels_avx512;
+#endif
+        STIPPLE_CHECK(count > 0, "this program was compiled for a processor with more instructions (STIPPLE_KERNELS)");
+    }
+};
+
+}  // namespace
 
 const Kernels* const* availableKernels(size_t& count) {
-    static const struct List {
-        std::array<const Kernels*, 3> items{&kernels_sse};
-        size_t count = 1;
-        List() {
-#if defined(__x86_64__)
-            __builtin_cpu_init();
-            if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) items.at(count++) = &kernels_avx2;
-            if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-                __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
-                items.at(count++) = &kernels_avx512;
-#endif
-        }
-    } list;
+    static const List list;
     count = list.count;
     return list.items.data();
 }
