@@ -8,6 +8,7 @@ struct alignas(64) MirrorLanes {
     float rx[kTile], ry[kTile], rz[kTile], x[kTile], y[kTile], dx[kTile], dy[kTile], linear[kTile], dLinear[kTile];
     float steps[kTile], stepPixels[kTile], share[kTile];
     float before[kTile], isInFront[kTile];         // of the step before
+    float passed[kTile];                           // the last step that has passed behind something
     float found[kTile], length[kTile];             // the step that meets something, or 0; how long that is
     float low[kTile], high[kTile];                 // between which shares of the way
     float hitX[kTile], hitY[kTile];                // px
@@ -68,8 +69,7 @@ struct alignas(64) MirrorLanes {
         m.steps[i] = r.share > 0.0f ? r.steps : 0.0f;
         m.stepPixels[i] = r.stepPixels;
         m.share[i] = r.share;
-        m.before[i] = depthOfLinear(lens, r.linear);
-        m.isInFront[i] = 1.0f;
+        m.passed[i] = 0.0f;
         m.found[i] = 0.0f;
         m.length[i] = 1.0f;
     }
@@ -82,6 +82,11 @@ struct alignas(64) MirrorLanes {
     const float width = float(int(f.width)), height = float(int(f.height));
     const int pitch = int(f.width);
     constexpr uint32_t kLook = 8;  // steps after which rays are looked at whether any goes on
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        m.before[i] = depthOfLinear(lens, m.linear[i]);
+        m.isInFront[i] = 1.0f;
+    }
     for (uint32_t step = 1; step <= steps; ++step) {
         const float k = float(int(step));
 #pragma GCC ivdep
@@ -92,8 +97,8 @@ struct alignas(64) MirrorLanes {
             const float depth = depths[mirrorPixel(y, height) * pitch + mirrorPixel(x, width)];
             const float behind = mirrorBehind(z, depth), length = mirrorStep(lens, m.stepPixels[i], m.before[i], z);
             const float found = m.found[i], mayMeet = (found > 0.0f ? 0.0f : m.isInFront[i]);
-            const float meets =
-                mayMeet * (k <= m.steps[i] ? 1.0f : 0.0f) * (behind > 0.0f ? 1.0f : 0.0f) * (behind < length ? 1.0f : 0.0f);
+            const float isNew = (k > m.passed[i] ? 1.0f : 0.0f) * (k <= m.steps[i] ? 1.0f : 0.0f);
+            const float meets = mayMeet * isNew * (behind > 0.0f ? 1.0f : 0.0f);
             m.found[i] = meets > 0.5f ? k : found;
             m.length[i] = meets > 0.5f ? length : m.length[i];
             m.isInFront[i] = behind > 0.0f ? 0.0f : 1.0f;
@@ -128,6 +133,33 @@ struct alignas(64) MirrorLanes {
             m.low[i] = isBehind ? m.low[i] : share;
             m.high[i] = isBehind ? share : m.high[i];
         }
+}
+
+/// Rays that are too far behind what they were to meet go on, the others do not; false if none does.
+[[gnu::always_inline]] inline bool passBehind(const FrameConstants& f, const float* __restrict depths, size_t count,
+                                              MirrorLanes& lanes) {
+    MirrorLanes& __restrict m = lanes;
+    const Lens lens = lensHere(f.focal);
+    const float width = float(int(f.width)), height = float(int(f.height));
+    const int pitch = int(f.width);
+    alignas(64) float passes[kTile];
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const float x = m.x[i] + m.high[i] * m.dx[i], y = m.y[i] + m.high[i] * m.dy[i];
+        const float depth = depths[mirrorPixel(y, height) * pitch + mirrorPixel(x, width)];
+        const float behind = mirrorBehind(mirrorDepth(lens, m.linear[i], m.dLinear[i], m.high[i]), depth);
+        passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (behind < m.length[i] ? 0.0f : 1.0f);
+    }
+    float any = 0.0f;
+    for (size_t i = 0; i < count; ++i) any = max(any, passes[i]);
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const bool goesOn = passes[i] > 0.0f;
+        m.steps[i] = (goesOn ? 1.0f : m.found[i]) > 0.0f ? m.steps[i] : 0.0f;
+        m.passed[i] = goesOn ? m.found[i] : m.passed[i];
+        m.found[i] = goesOn ? 0.0f : m.found[i];
+    }
+    return any > 0.0f;
 }
 
 /// Where rays meet something, and how much that counts.
@@ -233,8 +265,12 @@ bool reflectRow(const FrameConstants& frame, const ReflectionInput& in, uint32_t
     size_t count = takeMirrors(f, in, first, float(int(x0)) + 0.5f - f.centre.x, n, m);
     if (count == 0) return false;
     startRays(f, in.constants, py, count, m);
-    followRays(f, in.depth, in.constants.steps, count, m);
-    narrowSteps(f, in.depth, count, m);
+    bool goesOn = true;
+    for (uint32_t tries = 0; goesOn && tries < kMirrorTries; ++tries) {
+        followRays(f, in.depth, in.constants.steps, count, m);
+        narrowSteps(f, in.depth, count, m);
+        goesOn = passBehind(f, in.depth, count, m);
+    }
     weighHits(f, in, py, count, m);
     count = keepHits(m, count);
     if (count == 0) return false;

@@ -29,6 +29,24 @@ vec3 lightMet(float x, float y, vec3 surroundings) {
     return sum;
 }
 
+// How far behind what is seen there the ray is at a share of its way.
+float behindAt(MirrorRay m, float share) {
+    const float z = mirrorDepth(frameLensHere(), m.linear, m.dLinear, share);
+    return mirrorBehind(z, depthAt(m.x + share * m.dx, m.y + share * m.dy));
+}
+// The share of the way at which step number k goes behind.
+float narrowed(MirrorRay m, float k) {
+    float low = (k - 1.0) / m.steps, high = k / m.steps;
+    for (uint h = 0u; h < kMirrorHalvings; ++h) {
+        const float share = 0.5 * (low + high);
+        if (behindAt(m, share) > 0.0)
+            high = share;
+        else
+            low = share;
+    }
+    return high;
+}
+
 vec3 mirrored(uvec2 pixel) {
     const SurfaceWords words = surfaceBuffer[pixel.y * frame.width + pixel.x];
     if (!(words.depth > 0.0) || !isMirror(words.material, frame.shade)) return vec3(0.0);
@@ -46,27 +64,23 @@ vec3 mirrored(uvec2 pixel) {
     s.dielectric = vec3(kDielectric);
     const MirrorRay m = mirrorRay(reflection, lens, frame.centre, pictureSize(), place, s.normal, s.toEye, s.roughness);
     if (!(m.share > 0.0)) return vec3(0.0);
-    float before = depthOfLinear(lens, m.linear), found = 0.0, stepLength = 1.0;
-    bool isInFront = true;
-    for (float k = 1.0; k <= m.steps && found == 0.0; k += 1.0) {
+    float before = depthOfLinear(lens, m.linear), high = 0.0, stepLength = 1.0;
+    bool isInFront = true, isFound = false;
+    uint tries = 0u;
+    for (float k = 1.0; k <= m.steps && !isFound && tries < kMirrorTries; k += 1.0) {
         const float share = k / m.steps;
         const float z = mirrorDepth(lens, m.linear, m.dLinear, share);
-        const float behind = mirrorBehind(z, depthAt(m.x + share * m.dx, m.y + share * m.dy));
-        stepLength = mirrorStep(lens, m.stepPixels, before, z);
-        if (isInFront && behind > 0.0 && behind < stepLength) found = k;
-        isInFront = !(behind > 0.0);
+        const bool isBehind = behindAt(m, share) > 0.0;
+        if (isInFront && isBehind) {
+            stepLength = mirrorStep(lens, m.stepPixels, before, z);
+            high = narrowed(m, k);
+            isFound = behindAt(m, high) < stepLength;
+            ++tries;
+        }
+        isInFront = !isBehind;
         before = z;
     }
-    if (found == 0.0) return vec3(0.0);
-    float low = (found - 1.0) / m.steps, high = found / m.steps;
-    for (uint h = 0u; h < kMirrorHalvings; ++h) {
-        const float share = 0.5 * (low + high);
-        const float depth = depthAt(m.x + share * m.dx, m.y + share * m.dy);
-        if (mirrorBehind(mirrorDepth(lens, m.linear, m.dLinear, share), depth) > 0.0)
-            high = share;
-        else
-            low = share;
-    }
+    if (!isFound) return vec3(0.0);
     const float x = m.x + high * m.dx, y = m.y + high * m.dy, z = mirrorDepth(lens, m.linear, m.dLinear, high);
     const vec2 size = pictureSize();
     const vec3 n = octDecode(surfaceBuffer[entryAt(mirrorPixel(x, size.x), mirrorPixel(y, size.y))].normal);

@@ -2,7 +2,8 @@
 //
 // The mirror ray of a pixel is followed across the picture in even steps, its depth by what is linear there (lens.h),
 // until it is behind what a pixel shows and was in front of the picture a step before; halvings of that step find the
-// place. What lies farther before the ray than the step is long has it pass behind: things are as thick as a step.
+// place. Where it is farther behind even there than the step is long it passes behind, and goes on: things are as thick
+// as a step.
 //
 //        eye ------> o surface          from o on: in front, in front, behind: between those two it is met
 //                     \_ . _ . _ x
@@ -31,6 +32,7 @@ const float kMirrorLift = 1.0f;       // px that rays begin above their surface
 const float kMirrorTowards = 0.9f;    // of the way to the eye's plane
 const float kMirrorBorder = 0.0625f;  // of the picture's shorter side: there it fades
 const uint kMirrorHalvings = 6u;
+const uint kMirrorTries = 4u;  // things that rays pass behind at most, and one more
 
 // Does a pixel of that word (surface.h) mirror the picture? `shade`: of the frame.
 SHARED_FN bool isMirror(uint word, uint shade) {

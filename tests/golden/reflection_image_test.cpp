@@ -22,6 +22,8 @@ using test::lookingAt;
 using test::Shapes;
 
 constexpr double kRadius = 0.7;
+/// Frames with the effect keep the surface buffer, whose colours and normals are rounded.
+constexpr double kRounding = 2e-3;
 const dvec3 kMiddle{0.1, 0.6, 1.3}, kColour{0.8, 0.06, 0.1};
 
 scene::Material mirror(float roughness, float metallic = 1) {
@@ -112,7 +114,7 @@ TEST_F(ScreenReflections, AMirrorShowsTheBallWhereRaysSay) {
                 const auto [place, ray] = seenAt(off, view, i);
                 const dvec3 more = linearAt(on, i) - linearAt(off, i);
                 if (std::abs(place.z) > 1e-3) {
-                    EXPECT_EQ(most(more), 0) << "the ball is no mirror";
+                    EXPECT_LT(most(more), kRounding) << "the ball is no mirror";
                     continue;
                 }
                 const dvec3 up(ray.x, ray.y, -ray.z);
@@ -132,13 +134,13 @@ TEST_F(ScreenReflections, AMirrorShowsTheBallWhereRaysSay) {
                     wrong += isRight ? 0 : 1;
                 } else if (ball.nearest > kRadius + 3 * pixel) {
                     ++beside;
-                    changed += most(more) > 0 ? 1 : 0;
+                    changed += most(more) > kRounding ? 1 : 0;
                 }
             }
             const std::string what = fmt::format("{}, parallel {}", name, isOrthographic);
             fmt::print("{}: {} pixels show the ball, {} not so; {} beside it, {} changed; share at most {:.3f} off\n",
                        what, shown, wrong, beside, changed, farthest);
-            EXPECT_GT(shown, 500u) << what;
+            EXPECT_GT(shown, 200u) << what;
             EXPECT_LE(wrong, shown / 100) << what;
             EXPECT_GT(beside, 5'000u) << what;
             EXPECT_LE(changed, beside / 1000) << what;
@@ -165,8 +167,11 @@ TEST_F(ScreenReflections, GoWithRoughnessAndAreNothingBeyondTheRoughest) {
         const Image off = state->image;
         const auto passes = state->counters.passes;
         ASSERT_TRUE(render::renderUntilComplete(*state, view, with(true)));
+        for (size_t i = 0; i < off.rgba.size(); ++i)
+            ASSERT_LT(most(linearAt(state->image, i) - linearAt(off, i)), kRounding) << i;
+        if (floor.isUnlit) continue;
         EXPECT_TRUE(state->image.rgba == off.rgba && state->image.linear == off.linear);
-        if (!floor.isUnlit) EXPECT_EQ(state->counters.passes, passes);
+        EXPECT_EQ(state->counters.passes, passes);
     }
 }
 
@@ -188,6 +193,9 @@ class MirrorsOfAllKinds : public ScreenReflections {
         return out;
     }
 };
+
+/// Steps of a pixel and less: the oracle goes from pixel to pixel.
+constexpr double kOfAPixel = 240;
 
 /// Shares of the pixels with a channel more than 12 and more than 64 of 255 apart.
 struct Unlike {
@@ -215,6 +223,7 @@ TEST_F(MirrorsOfAllKinds, AreThoseOfTheOracleInEveryMode) {
                 view.width = 160;
                 view.height = 120;
                 FrameSettings settings = with(true, mode.mode), without = with(false, mode.mode);
+                settings.draw.parameters.reflection.steps = kOfAPixel;
                 for (FrameSettings* s : {&settings, &without}) {
                     s->draw.lit = true;
                     if (areAllMirrors) s->draw.pointMaterial = shared::packPointMaterial(0.05f, 1);
@@ -242,6 +251,7 @@ TEST_F(MirrorsOfAllKinds, OfPatchesAndShadowsAreThoseOfTheOracle) {
     const lod::View view = test::fitView(*store, 160, 120);
     for (const bool isShadowed : {false, true}) {
         FrameSettings s = with(true);
+        s.draw.parameters.reflection.steps = kOfAPixel;
         s.draw.lit = true;
         s.draw.pointMaterial = shared::packPointMaterial(0.05f, 1);
         if (isShadowed) {
@@ -265,19 +275,19 @@ TEST_F(MirrorsOfAllKinds, OfPatchesAndShadowsAreThoseOfTheOracle) {
 /// and does not vanish at once.
 TEST_F(ScreenReflections, FadeWhereTheCameraMoves) {
     const auto store = built(ballAbove(mirror(0.02f)));
-    constexpr int kViews = 60;
+    constexpr int kViews = 120;
     std::vector<double> sums;
     double largest = 0, step = 0;
     for (int k = 0; k < kViews; ++k) {
         lod::View view = lookingAt({0, 0.6, 0.6}, {0, -6, 1.6});
-        view.shift = dvec2(0, -3 * k);  // the ball leaves at the top before its mirror image does
+        view.shift = dvec2(0, -1.5 * k);  // the ball leaves at the top before its mirror image does
         double sum = 0;
         for (const dvec3& c : added(store, view)) sum += most(c);
         if (!sums.empty()) step = std::max(step, std::abs(sum - sums.back()));
         largest = std::max(largest, sum);
         sums.push_back(sum);
     }
-    fmt::print("a step of 3 px changes what is mirrored by {:.3f} of it at most; last {:.3f}\n", step / largest,
+    fmt::print("a step of 1.5 px changes what is mirrored by {:.3f} of it at most; last {:.3f}\n", step / largest,
                sums.back() / largest);
     EXPECT_LT(step, 0.1 * largest);
     EXPECT_LT(sums.back(), 0.02 * largest) << "it has left";
@@ -313,11 +323,29 @@ TEST_F(ScreenReflections, OfAnyDistanceAndNumberOfStepsAreAPicture) {
         }
     FrameSettings near = with(true);
     near.draw.parameters.reflection.distance = 0.3;
-    EXPECT_TRUE(draw(store, usual(), view, near).rgba == draw(store, usual(), view, with(false)).rgba)
-        << "the ball is farther from the floor than that";
+    const Image off = draw(store, usual(), view, with(false)), on = draw(store, usual(), view, near);
+    for (size_t i = 0; i < off.rgba.size(); ++i)
+        ASSERT_LT(most(linearAt(on, i) - linearAt(off, i)), kRounding)
+            << "the ball is farther from the floor than that";
 }
 
 #ifndef STIPPLE_ON_GPU
+TEST_F(ScreenReflections, AreCalledForWhereOpaqueMaterialsAreSmooth) {
+    scene::Material glass = mirror(0, 0);
+    glass.optics = *lod::opticsNamed("glass");
+    const auto call = [&](const scene::Material& floor, const render::DrawSettings& s) {
+        const std::vector<std::shared_ptr<const lod::Store>> stores{built(ballAbove(floor))};
+        return render::factsOf(stores, s).hasMirrors;
+    };
+    render::DrawSettings unlit;
+    unlit.unlitTriangles = true;
+    EXPECT_TRUE(call(mirror(0.29f), {}));
+    EXPECT_TRUE(call(mirror(0.29f, 0), {})) << "no metal, but a mirror where it is seen at grazing angles";
+    EXPECT_FALSE(call(mirror(0.31f), {}));
+    EXPECT_FALSE(call(mirror(0.1f), unlit));
+    EXPECT_FALSE(call(glass, {}));
+}
+
 TEST_F(MirrorsOfAllKinds, AreTheSameBytesForAnyThreadsAndOnEveryInstructionSet) {
     const auto placed = this->placed();
     const lod::View view = lookingAt({0.5, 0, -0.3}, {0, -5, 2});

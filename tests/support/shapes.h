@@ -66,6 +66,7 @@ class Shapes {
     std::shared_ptr<const lod::Store> built(const std::string& path, Executor& executor) const {
         lod::MeshBuildSettings build;
         build.description.materials = scene::surfaceMaterials(scene_);
+        build.description.optics = scene::surfaceOptics(scene_, scene::placements(scene_));
         Progress silent(false);
         const auto done = lod::buildMeshStore(scene::triangleSource(scene_, scene::placements(scene_)), path, build,
                                               executor, silent);
