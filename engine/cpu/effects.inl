@@ -127,14 +127,13 @@ void backgroundRow(const FrameConstants& frame, const BackgroundConstants& const
         row.behindGreen[i] = c.y;
         row.behindBlue[i] = c.z;
     };
+    // (Look-ups anywhere in a picture: no SIMD is made of these loops.)
     if (!(most > 0.0f))
-#pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const vec3 c = look(0u, i);
             show(i, c, c, 0.0f);
         }
     else
-#pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const auto fine = uint32_t(int(level[i]));
             const uint32_t coarse = fine + 1u < b.levels ? fine + 1u : fine;

@@ -439,7 +439,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
         {shared::kFilteredBinding, {Plane::filtered}},
         {shared::kCoverageBinding, {Plane::filtered}},
         {shared::kSecondGroupsBinding, {Plane::filtered}},
-        {shared::kTexelsBinding, {Plane::texels, Plane::coarse, Plane::smooth}},
+        {shared::kTexelsBinding, {Plane::texels, Plane::coarse, Plane::smooth, Plane::behind}},  // one room
         {shared::kTriangleWordsBinding, {Plane::texels}},
         {shared::kSurfaceBinding, {Plane::surface}},
         {shared::kImageBinding, {Plane::image}}};
