@@ -83,6 +83,7 @@ constinit const Effect reflectionEffect{
     .ofFrame = ofFrame,
     .fill = fill,
     .passes = kPasses,
-    .tables = kTables};
+    .tables = kTables,
+    .toleranceSteps = 1};  // what is kept between passes is rounded
 
 }  // namespace stipple::render
