@@ -60,8 +60,6 @@ DrawSettings inUnits(DrawSettings settings, double units) {
     fog.density /= units;
     fog.height *= units;
     fog.base *= units;
-    settings.parameters.occlusion.radius *= units;
-    settings.parameters.facts.extent *= units;
     return settings;
 }
 

@@ -7,6 +7,7 @@
 #include "engine/cpu/cpu_backend.h"
 #include "engine/render/effects/table.h"
 #include "engine/render/frame_passes.h"
+#include "engine/render/length_unit.h"
 #include "tests/support/curves.h"
 #include "tests/support/meshes.h"
 
@@ -134,6 +135,24 @@ TEST_F(Effects, ThatAreAskedForByNameAreThoseOfTheTable) {
             EXPECT_FALSE(requestedEffects(allEffects(), {}).has(e));
         }
     }
+}
+
+/// Lengths of a scene that is drawn in another unit, each once.
+TEST(LengthUnits, ScaleWhatEffectsAreAskedForOnce) {
+    DrawSettings of;
+    of.parameters.occlusion.radius = 2;
+    of.parameters.reflection.distance = 3;
+    of.parameters.facts.extent = 5;
+    of.parameters.fog.density = 7;
+    of.parameters.fog.height = 11;
+    of.parameters.fog.base = 13;
+    const EffectParameters in = inUnits(of, 4).parameters;
+    EXPECT_EQ(in.occlusion.radius, 8);
+    EXPECT_EQ(in.reflection.distance, 12);
+    EXPECT_EQ(in.facts.extent, 20);
+    EXPECT_EQ(in.fog.density, 1.75);
+    EXPECT_EQ(in.fog.height, 44);
+    EXPECT_EQ(in.fog.base, 52);
 }
 
 }  // namespace
