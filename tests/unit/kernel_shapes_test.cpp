@@ -19,7 +19,7 @@ uint32_t directionOf(Rng& rng) {
     return static_cast<uint32_t>(rng.below(65535)) | static_cast<uint32_t>(rng.below(65535)) << 16;
 }
 
-vec3 scaled(const vec3& v, float by) { return {v.x * by, v.y * by, v.z * by}; }
+vec3 stretched(const vec3& v, float by) { return {v.x * by, v.y * by, v.z * by}; }
 vec3 plus(const vec3& a, const vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 vec3 minus(const vec3& a, const vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 
@@ -66,7 +66,8 @@ CameraSegment placed(const DrawNode& node, const CurveSegment& s) {
     const auto place = [&](const CurveVertex& v) {
         const auto x = static_cast<float>(v.positionXY & 0xffffu), y = static_cast<float>(v.positionXY >> 16),
                    z = static_cast<float>(v.positionZ & 0xffffu);
-        return plus(plus(plus(node.base, scaled(node.axisX, x)), scaled(node.axisY, y)), scaled(node.axisZ, z));
+        return plus(plus(plus(node.base, stretched(node.axisX, x)), stretched(node.axisY, y)),
+                    stretched(node.axisZ, z));
     };
     return {place(s.a),
             place(s.b),
@@ -337,14 +338,15 @@ TEST(KernelFormulas, TexelsOfTrianglesAreThoseOfTheFormulas) {
                     const auto linear = [&](uint32_t shift) {
                         return weight.at(v) * linearFromByte(float(vertex.colour >> shift & 255u) * (1.0f / 255.0f));
                     };
-                    n = v == 0 ? scaled(own, weight.at(v)) : plus(n, scaled(own, weight.at(v)));
+                    n = v == 0 ? stretched(own, weight.at(v)) : plus(n, stretched(own, weight.at(v)));
                     const vec3 part(linear(0), linear(8), linear(16));
                     colour = v == 0 ? part : plus(colour, part);
                 }
                 vec3 face(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
                 const bool isFlat = (c.vertices[at[0]].surface & kSurfaceFlat) != 0u;
                 const DrawMesh& m = c.mesh;
-                const vec3 world = plus(plus(scaled(m.normalX, n.x), scaled(m.normalY, n.y)), scaled(m.normalZ, n.z));
+                const vec3 world =
+                    plus(plus(stretched(m.normalX, n.x), stretched(m.normalY, n.y)), stretched(m.normalZ, n.z));
                 if (!isFlat) face = faceBeside(face, world);
                 const vec3 normal = surfaceNormal(isFlat ? face : world, face, rayDirection(ray));
                 const vec3 d = rayDirection(ray);

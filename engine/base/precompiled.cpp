@@ -1,0 +1,1 @@
+// Stands for precompiled.h, which other targets take from here.
