@@ -6,14 +6,15 @@ struct alignas(64) MirrorLanes {
     uint32_t at[kTile];
     float px[kTile], depth[kTile], nx[kTile], ny[kTile], nz[kTile], roughness[kTile];
     float rx[kTile], ry[kTile], rz[kTile], x[kTile], y[kTile], dx[kTile], dy[kTile], linear[kTile], dLinear[kTile];
-    float steps[kTile], stepPixels[kTile], share[kTile];
-    float before[kTile], isInFront[kTile];         // of the step before
-    float passed[kTile];                           // the last step that has passed behind something
-    float found[kTile], length[kTile];             // the step that meets something, or 0; how long that is
-    float low[kTile], high[kTile];                 // between which shares of the way
-    float hitX[kTile], hitY[kTile];                // px
-    float metR[kTile], metG[kTile], metB[kTile];   // of what is met, less what would be seen without it
-    float farR[kTile], farG[kTile], farB[kTile];   // that
+    float steps[kTile], onePixel[kTile], share[kTile];
+    float isInFront[kTile];                       // of the step before
+    float passed[kTile];                          // the last step that has passed behind something
+    float found[kTile];                           // the step that meets something, or 0
+    float low[kTile], high[kTile];                // between which shares of the way
+    float off[kTile];                             // there, mirrorOff
+    float hitX[kTile], hitY[kTile];               // px
+    float metR[kTile], metG[kTile], metB[kTile];  // of what is met, less what would be seen without it
+    float farR[kTile], farG[kTile], farB[kTile];  // that
 };
 
 [[gnu::always_inline]] inline size_t takeMirrors(const FrameConstants& f, const ReflectionInput& in, size_t first,
@@ -54,9 +55,8 @@ struct alignas(64) MirrorLanes {
     const vec2 centre(f.centre.x, f.centre.y), size(float(int(f.width)), float(int(f.height)));
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
-        const MirrorRay r =
-            mirrorRay(c, lens, centre, size, placeOf(lens, m.px[i], py, m.depth[i]), vec3(m.nx[i], m.ny[i], m.nz[i]),
-                      towardsEye(lens, m.px[i], py), m.roughness[i]);
+        const MirrorRay r = mirrorRay(c, lens, centre, size, placeOf(lens, m.px[i], py, m.depth[i]),
+                                      vec3(m.nx[i], m.ny[i], m.nz[i]), towardsEye(lens, m.px[i], py), m.roughness[i]);
         m.rx[i] = r.direction.x;
         m.ry[i] = r.direction.y;
         m.rz[i] = r.direction.z;
@@ -67,11 +67,10 @@ struct alignas(64) MirrorLanes {
         m.linear[i] = r.linear;
         m.dLinear[i] = r.dLinear;
         m.steps[i] = r.share > 0.0f ? r.steps : 0.0f;
-        m.stepPixels[i] = r.stepPixels;
+        m.onePixel[i] = r.onePixel;
         m.share[i] = r.share;
         m.passed[i] = 0.0f;
         m.found[i] = 0.0f;
-        m.length[i] = 1.0f;
     }
 }
 
@@ -82,11 +81,7 @@ struct alignas(64) MirrorLanes {
     const float width = float(int(f.width)), height = float(int(f.height));
     const int pitch = int(f.width);
     constexpr uint32_t kLook = 8;  // steps after which rays are looked at whether any goes on
-#pragma GCC ivdep
-    for (size_t i = 0; i < count; ++i) {
-        m.before[i] = depthOfLinear(lens, m.linear[i]);
-        m.isInFront[i] = 1.0f;
-    }
+    for (size_t i = 0; i < count; ++i) m.isInFront[i] = 1.0f;
     for (uint32_t step = 1; step <= steps; ++step) {
         const float k = float(int(step));
 #pragma GCC ivdep
@@ -95,14 +90,12 @@ struct alignas(64) MirrorLanes {
             const float x = m.x[i] + share * m.dx[i], y = m.y[i] + share * m.dy[i];
             const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], share);
             const float depth = depths[mirrorPixel(y, height) * pitch + mirrorPixel(x, width)];
-            const float behind = mirrorBehind(z, depth), length = mirrorStep(lens, m.stepPixels[i], m.before[i], z);
+            const float behind = mirrorBehind(z, depth);
             const float found = m.found[i], mayMeet = (found > 0.0f ? 0.0f : m.isInFront[i]);
             const float isNew = (k > m.passed[i] ? 1.0f : 0.0f) * (k <= m.steps[i] ? 1.0f : 0.0f);
             const float meets = mayMeet * isNew * (behind > 0.0f ? 1.0f : 0.0f);
             m.found[i] = meets > 0.5f ? k : found;
-            m.length[i] = meets > 0.5f ? length : m.length[i];
             m.isInFront[i] = behind > 0.0f ? 0.0f : 1.0f;
-            m.before[i] = z;
         }
         if (step % kLook != 0) continue;
         uint32_t going = 0;
@@ -135,20 +128,26 @@ struct alignas(64) MirrorLanes {
         }
 }
 
-/// Rays that are too far behind what they were to meet go on, the others do not; false if none does.
-[[gnu::always_inline]] inline bool passBehind(const FrameConstants& f, const float* __restrict depths, size_t count,
-                                              MirrorLanes& lanes) {
+/// Rays that are too far from the plane of what they were to meet go on, the others do not; false if none does.
+[[gnu::always_inline]] inline bool passBehind(const FrameConstants& f, const float* __restrict depths,
+                                              const uint32_t* __restrict normals, size_t count, MirrorLanes& lanes) {
     MirrorLanes& __restrict m = lanes;
     const Lens lens = lensHere(f.focal);
     const float width = float(int(f.width)), height = float(int(f.height));
+    const float centreX = f.centre.x, centreY = f.centre.y;
     const int pitch = int(f.width);
     alignas(64) float passes[kTile];
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const float x = m.x[i] + m.high[i] * m.dx[i], y = m.y[i] + m.high[i] * m.dy[i];
-        const float depth = depths[mirrorPixel(y, height) * pitch + mirrorPixel(x, width)];
-        const float behind = mirrorBehind(mirrorDepth(lens, m.linear[i], m.dLinear[i], m.high[i]), depth);
-        passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (behind < m.length[i] ? 0.0f : 1.0f);
+        const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], m.high[i]), back = m.high[i] - m.onePixel[i];
+        const float zBack = mirrorDepth(lens, m.linear[i], m.dLinear[i], back);
+        const int column = mirrorPixel(x, width), line = mirrorPixel(y, height), at = line * pitch + column;
+        const vec3 place = placeOf(lens, float(column) + 0.5f - centreX, float(line) + 0.5f - centreY, depths[at]);
+        const vec3 here = placeOf(lens, x - centreX, y - centreY, z);
+        const vec3 before = placeOf(lens, m.x[i] + back * m.dx[i] - centreX, m.y[i] + back * m.dy[i] - centreY, zBack);
+        m.off[i] = mirrorOff(lens, place, octDecode(normals[at]), here, before);
+        passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (m.off[i] < kMirrorFarOff ? 0.0f : 1.0f);
     }
     float any = 0.0f;
     for (size_t i = 0; i < count; ++i) any = max(any, passes[i]);
@@ -168,7 +167,6 @@ struct alignas(64) MirrorLanes {
     MirrorLanes& __restrict m = lanes;
     const ReflectionConstants c = in.constants;
     const Lens lens = lensHere(f.focal);
-    const float* const __restrict depths = in.depth;
     const uint32_t* const __restrict normals = in.normal;
     const float centreX = f.centre.x, centreY = f.centre.y;
     const vec2 size(float(int(f.width)), float(int(f.height)));
@@ -181,7 +179,7 @@ struct alignas(64) MirrorLanes {
         const vec3 own = placeOf(lens, m.px[i], py, m.depth[i]), hit = placeOf(lens, x - centreX, y - centreY, z);
         const vec3 way(hit.x - own.x, hit.y - own.y, hit.z - own.z);
         const float hitShare = mirrorHit(c, size, vec3(m.rx[i], m.ry[i], m.rz[i]), octDecode(normals[at]), x, y,
-                                         mirrorBehind(z, depths[at]), m.length[i], std::sqrt(dot(way, way)));
+                                         m.off[i], std::sqrt(dot(way, way)));
         m.hitX[i] = x;
         m.hitY[i] = y;
         m.share[i] = m.found[i] > 0.0f ? m.share[i] * hitShare : 0.0f;
@@ -269,7 +267,7 @@ bool reflectRow(const FrameConstants& frame, const ReflectionInput& in, uint32_t
     for (uint32_t tries = 0; goesOn && tries < kMirrorTries; ++tries) {
         followRays(f, in.depth, in.constants.steps, count, m);
         narrowSteps(f, in.depth, count, m);
-        goesOn = passBehind(f, in.depth, count, m);
+        goesOn = passBehind(f, in.depth, in.normal, count, m);
     }
     weighHits(f, in, py, count, m);
     count = keepHits(m, count);
@@ -300,8 +298,7 @@ bool reflectRow(const FrameConstants& frame, const ReflectionInput& in, uint32_t
     for (size_t i = 0; i < n; ++i) out.red[i] = out.green[i] = out.blue[i] = 0.0f;
     for (size_t i = 0; i < count; ++i) {
         const Surface s = mirrorOf(in, lens, m, i, first + m.at[i], py);
-        const vec3 added =
-            mirrorAdded(s, vec3(m.share[i] * m.metR[i], m.share[i] * m.metG[i], m.share[i] * m.metB[i]));
+        const vec3 added = mirrorAdded(s, vec3(m.share[i] * m.metR[i], m.share[i] * m.metG[i], m.share[i] * m.metB[i]));
         out.red[m.at[i]] = added.x;
         out.green[m.at[i]] = added.y;
         out.blue[m.at[i]] = added.z;

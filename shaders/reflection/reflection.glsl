@@ -47,6 +47,19 @@ float narrowed(MirrorRay m, float k) {
     return high;
 }
 
+// How far off the plane of what is seen there the ray is (mirrorOff).
+float offAt(MirrorRay m, float share) {
+    const Lens lens = frameLensHere();
+    const float back = share - m.onePixel;
+    const float x = m.x + share * m.dx, y = m.y + share * m.dy;
+    const vec2 size = pictureSize();
+    const int column = mirrorPixel(x, size.x), line = mirrorPixel(y, size.y);
+    const SurfaceWords s = surfaceBuffer[entryAt(column, line)];
+    return mirrorOff(lens, placeAt(float(column) + 0.5, float(line) + 0.5, s.depth), octDecode(s.normal),
+                     placeAt(x, y, mirrorDepth(lens, m.linear, m.dLinear, share)),
+                     placeAt(m.x + back * m.dx, m.y + back * m.dy, mirrorDepth(lens, m.linear, m.dLinear, back)));
+}
+
 vec3 mirrored(uvec2 pixel) {
     const SurfaceWords words = surfaceBuffer[pixel.y * frame.width + pixel.x];
     if (!(words.depth > 0.0) || !isMirror(words.material, frame.shade)) return vec3(0.0);
@@ -64,27 +77,25 @@ vec3 mirrored(uvec2 pixel) {
     s.dielectric = vec3(kDielectric);
     const MirrorRay m = mirrorRay(reflection, lens, frame.centre, pictureSize(), place, s.normal, s.toEye, s.roughness);
     if (!(m.share > 0.0)) return vec3(0.0);
-    float before = depthOfLinear(lens, m.linear), high = 0.0, stepLength = 1.0;
+    float high = 0.0, off = 0.0;
     bool isInFront = true, isFound = false;
     uint tries = 0u;
     for (float k = 1.0; k <= m.steps && !isFound && tries < kMirrorTries; k += 1.0) {
         const float share = k / m.steps;
-        const float z = mirrorDepth(lens, m.linear, m.dLinear, share);
         const bool isBehind = behindAt(m, share) > 0.0;
         if (isInFront && isBehind) {
-            stepLength = mirrorStep(lens, m.stepPixels, before, z);
             high = narrowed(m, k);
-            isFound = behindAt(m, high) < stepLength;
+            off = offAt(m, high);
+            isFound = off < kMirrorFarOff;
             ++tries;
         }
         isInFront = !isBehind;
-        before = z;
     }
     if (!isFound) return vec3(0.0);
     const float x = m.x + high * m.dx, y = m.y + high * m.dy, z = mirrorDepth(lens, m.linear, m.dLinear, high);
     const vec2 size = pictureSize();
     const vec3 n = octDecode(surfaceBuffer[entryAt(mirrorPixel(x, size.x), mirrorPixel(y, size.y))].normal);
-    const float share = m.share * mirrorHit(reflection, size, m.direction, n, x, y, mirrorBehind(z, depthAt(x, y)), stepLength, distance(placeAt(x, y, z), place));
+    const float share = m.share * mirrorHit(reflection, size, m.direction, n, x, y, off, distance(placeAt(x, y, z), place));
     if (!(share > 0.0)) return vec3(0.0);
     return mirrorAdded(s, share * lightMet(x, y, mirrorSurroundings(frame, s, m.direction)));
 }

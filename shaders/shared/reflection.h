@@ -2,14 +2,15 @@
 //
 // The mirror ray of a pixel is followed across the picture in even steps, its depth by what is linear there (lens.h),
 // until it is behind what a pixel shows and was in front of the picture a step before; halvings of that step find the
-// place. Where it is farther behind even there than the step is long it passes behind, and goes on: things are as thick
-// as a step.
+// place. Met is what has the ray in the plane of what that pixel shows, within a pixel and what the ray goes on towards
+// it in one; where it is farther from it (twice that), it passes behind, and goes on. (Depth would not tell: of grazing
+// ground one pixel is far behind the next.)
 //
 //        eye ------> o surface          from o on: in front, in front, behind: between those two it is met
 //                     \_ . _ . _ x
 //
 // How much of the light that is met counts is a product of shares that fade to nothing: with roughness, for rays that
-// come back to the eye, at the picture's border, at the end of the way, at the thickness of what is met, and where that
+// come back to the eye, at the picture's border, at the end of the way, off the plane of what is met, and where that
 // shows another side than the ray meets. So nothing comes or goes at once, and what does not count leaves the
 // surroundings where they were.
 //
@@ -54,8 +55,8 @@ struct MirrorRay {
     float linear;  // imageLinear
     float dLinear;
     float steps;
-    float stepPixels;
-    float share;  // how much of what it meets counts at most
+    float onePixel;  // that is this share of the way
+    float share;     // how much of what it meets counts at most
 };
 // Of the surface at `place` with the normal n; the picture is `size` px and has its principal point at `centre`.
 SHARED_FN MirrorRay mirrorRay(ReflectionConstants c, Lens lens, vec2 centre, vec2 size, vec3 place, vec3 n, vec3 toEye,
@@ -84,7 +85,7 @@ SHARED_FN MirrorRay mirrorRay(ReflectionConstants c, Lens lens, vec2 centre, vec
     m.dLinear = (imageLinear(lens, to.z) - m.linear) * inside;
     const float pixels = max(abs(m.dx), abs(m.dy));
     m.steps = min(floor(pixels) + 1.0f, float(int(c.steps)));
-    m.stepPixels = max(pixels / m.steps, 1.0f);
+    m.onePixel = 1.0f / max(pixels, 1.0f);
     const float back = dot(r, toEye);
     m.share = clampedShare((kMirrorRoughest - roughness) / (kMirrorRoughest - kMirrorSmoothest)) *
               clampedShare(1.0f - 2.0f * back);
@@ -97,19 +98,23 @@ SHARED_FN float mirrorDepth(Lens lens, float linear, float dLinear, float share)
 SHARED_FN int mirrorPixel(float at, float size) { return int(min(max(0.0f, at), size - 1.0f)); }
 // How far behind what a pixel shows a ray is; below 0 where it is not.
 SHARED_FN float mirrorBehind(float z, float depth) { return depth > 0.0f ? z - depth : -1.0f; }
-// How long a step is, world units.
-SHARED_FN float mirrorStep(Lens lens, float stepPixels, float before, float z) {
-    return abs(z - before) + stepPixels * lensDepth(lens, z) / lens.focal;
+// How far a ray is from the plane of what a pixel shows, in shares of what it is at most where it meets that. `place`
+// and `n`: of the pixel; `at`: of the ray, `before`: of it one pixel before.
+SHARED_FN float mirrorOff(Lens lens, vec3 place, vec3 n, vec3 at, vec3 before) {
+    const float off = dot(n, vec3(at.x - place.x, at.y - place.y, at.z - place.z));
+    const float on = dot(n, vec3(at.x - before.x, at.y - before.y, at.z - before.z));
+    return abs(off) / (abs(on) + lensDepth(lens, place.z) / lens.focal);
 }
+const float kMirrorFarOff = 2.0f;  // from there on it passes
 
-// What of the light that is met counts. `n`: there; (x, y): px; `behind`: how far behind it, `distance`: how far from
-// its surface the ray is.
-SHARED_FN float mirrorHit(ReflectionConstants c, vec2 size, vec3 direction, vec3 n, float x, float y, float behind,
-                          float step, float distance) {
+// What of the light that is met counts. `n`: there; (x, y): px; `off`: mirrorOff, `distance`: how far from its surface
+// the ray is.
+SHARED_FN float mirrorHit(ReflectionConstants c, vec2 size, vec3 direction, vec3 n, float x, float y, float off,
+                          float distance) {
     const float border = kMirrorBorder * min(size.x, size.y);
     const float inside = min(min(x, size.x - x), min(y, size.y - y));
-    return clampedShare(2.0f - 2.0f * behind / step) * clampedShare(-4.0f * dot(n, direction)) *
-           clampedShare(inside / border) * clampedShare(4.0f - 4.0f * distance / c.reach);
+    return clampedShare(kMirrorFarOff - off) * clampedShare(-4.0f * dot(n, direction)) * clampedShare(inside / border) *
+           clampedShare(4.0f - 4.0f * distance / c.reach);
 }
 
 // The four pixels about a place, number `tap` of them, and its share.

@@ -25,8 +25,7 @@ class MirrorImages {
           level_(level),
           view_(draws.view),
           size_(level.width, level.height),
-          reach_(draws.tableAt<shared::ReflectionConstants>(shared::kReflectionBinding)->reach),
-          steps_(draws.tableAt<shared::ReflectionConstants>(shared::kReflectionBinding)->steps) {
+          reach_(draws.tableAt<shared::ReflectionConstants>(shared::kReflectionBinding)->reach) {
         for (int y = 0; y < level.height; ++y)
             for (int x = 0; x < level.width; ++x) {
                 const Sample& s = *level.at(x, y);
@@ -56,13 +55,13 @@ class MirrorImages {
   private:
     struct Met {
         dvec2 at{0};
-        double depth = 0, behind = 0, step = 0;
+        double depth = 0, off = 0;  ///< off: the plane there, of what may be
     };
     struct Ray {
         dvec2 from{0}, to{0};  ///< px
         dvec3 begin{0}, end{0};
         double inside = 1;  ///< share of the way on the picture
-        double steps = 1, stepPixels = 1;
+        double pixels = 1;
     };
 
     bool isMirror(const Sample& s) const {
@@ -96,16 +95,19 @@ class MirrorImages {
             if (whole[k] != 0) r.inside = std::min(r.inside, ((whole[k] > 0 ? size_[k] : 0) - r.from[k]) / whole[k]);
         r.inside = faded(r.inside);
         r.to = r.from + r.inside * whole;
-        const double pixels = std::max(std::abs(r.to.x - r.from.x), std::abs(r.to.y - r.from.y));
-        r.steps = std::min(std::floor(pixels) + 1, double(steps_));
-        r.stepPixels = std::max(pixels / r.steps, 1.0);
+        r.pixels = std::max({std::abs(r.to.x - r.from.x), std::abs(r.to.y - r.from.y), 1.0});
         return r;
     }
-    /// How long the step is that a share of the way lies in.
-    double stepAt(const Ray& r, double share) const {
-        const double k = std::clamp(std::ceil(share * r.steps), 1.0, r.steps);
-        const double z = depthAlong(r, k / r.steps);
-        return std::abs(z - depthAlong(r, (k - 1) / r.steps)) + r.stepPixels / pixelsAt(view_, z);
+    dvec3 placeAlong(const Ray& r, double share) const {
+        return viewRay(view_, r.from + share * (r.to - r.from)).at(depthAlong(r, share));
+    }
+    /// How far the ray is from the plane of what a pixel shows, of a pixel there and what it goes on towards it in one.
+    double offPlane(const Ray& r, double share, int x, int y) const {
+        const dvec2 middle(x + 0.5, y + 0.5);
+        const dvec3 n = normalAt(*level_.at(x, y), middle, view_), here = placeAlong(r, share);
+        const double off = glm::dot(n, here - viewRay(view_, middle).at(depthOf(x, y))),
+                     on = glm::dot(n, here - placeAlong(r, share - 1 / r.pixels));
+        return std::abs(off) / (std::abs(on) + 1 / pixelsAt(view_, depthOf(x, y)));
     }
 
     /// Through one pixel after another, to the first wall that the ray goes behind.
@@ -128,8 +130,8 @@ class MirrorImages {
             const double entry = depthAlong(r, share), exit = depthAlong(r, end);
             if (wall > 0 && isInFront && std::max(entry, exit) > wall) {
                 const double at = entry > wall ? share : std::clamp(shareAtDepth(r, wall), share, end);
-                const double behind = std::max(entry - wall, 0.0), step = stepAt(r, at);
-                if (behind < step) return Met{r.from + at * way, std::max(entry, wall), behind, step};
+                const double off = offPlane(r, at, int(low.x), int(low.y));
+                if (off < 2) return Met{r.from + at * way, std::max(entry, wall), off};
             }
             isInFront = !(wall > 0 && exit > wall);
             share = std::max(end, share + 1e-9);
@@ -143,7 +145,7 @@ class MirrorImages {
         const double border = std::min(size_.x, size_.y) / 16;
         const double inside = std::min({met.at.x, size_.x - met.at.x, met.at.y, size_.y - met.at.y});
         const double distance = glm::length(viewRay(view_, met.at).at(met.depth) - place);
-        return faded(2 - 2 * met.behind / met.step) * faded(-4 * glm::dot(n, mirror)) * faded(inside / border) *
+        return faded(2 - met.off) * faded(-4 * glm::dot(n, mirror)) * faded(inside / border) *
                faded(4 - 4 * distance / reach_);
     }
 
@@ -168,7 +170,6 @@ class MirrorImages {
     const lod::View& view_;
     dvec2 size_;
     double reach_;
-    uint32_t steps_;
     std::vector<double> depths_;
 };
 
