@@ -128,7 +128,7 @@ struct alignas(64) MirrorLanes {
         }
 }
 
-/// Rays that are too far from the plane of what they were to meet go on, the others do not; false if none does.
+/// Rays that are too far behind what they were to meet go on, the others do not; false if none does.
 [[gnu::always_inline]] inline bool passBehind(const FrameConstants& f, const float* __restrict depths,
                                               const uint32_t* __restrict normals, size_t count, MirrorLanes& lanes) {
     MirrorLanes& __restrict m = lanes;
@@ -143,10 +143,8 @@ struct alignas(64) MirrorLanes {
         const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], m.high[i]), back = m.high[i] - m.onePixel[i];
         const float zBack = mirrorDepth(lens, m.linear[i], m.dLinear[i], back);
         const int column = mirrorPixel(x, width), line = mirrorPixel(y, height), at = line * pitch + column;
-        const vec3 place = placeOf(lens, float(column) + 0.5f - centreX, float(line) + 0.5f - centreY, depths[at]);
-        const vec3 here = placeOf(lens, x - centreX, y - centreY, z);
-        const vec3 before = placeOf(lens, m.x[i] + back * m.dx[i] - centreX, m.y[i] + back * m.dy[i] - centreY, zBack);
-        m.off[i] = mirrorOff(lens, place, octDecode(normals[at]), here, before);
+        const vec3 toEye = towardsEye(lens, float(column) + 0.5f - centreX, float(line) + 0.5f - centreY);
+        m.off[i] = mirrorOff(lens, z, zBack, depths[at], std::abs(dot(octDecode(normals[at]), toEye)));
         passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (m.off[i] < kMirrorFarOff ? 0.0f : 1.0f);
     }
     float any = 0.0f;

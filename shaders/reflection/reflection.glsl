@@ -47,17 +47,15 @@ float narrowed(MirrorRay m, float k) {
     return high;
 }
 
-// How far off the plane of what is seen there the ray is (mirrorOff).
+// How far behind what is seen there the ray is, of what that may be.
 float offAt(MirrorRay m, float share) {
     const Lens lens = frameLensHere();
-    const float back = share - m.onePixel;
-    const float x = m.x + share * m.dx, y = m.y + share * m.dy;
     const vec2 size = pictureSize();
-    const int column = mirrorPixel(x, size.x), line = mirrorPixel(y, size.y);
+    const int column = mirrorPixel(m.x + share * m.dx, size.x), line = mirrorPixel(m.y + share * m.dy, size.y);
     const SurfaceWords s = surfaceBuffer[entryAt(column, line)];
-    return mirrorOff(lens, placeAt(float(column) + 0.5, float(line) + 0.5, s.depth), octDecode(s.normal),
-                     placeAt(x, y, mirrorDepth(lens, m.linear, m.dLinear, share)),
-                     placeAt(m.x + back * m.dx, m.y + back * m.dy, mirrorDepth(lens, m.linear, m.dLinear, back)));
+    const vec3 toEye = -normalize(rayDirection(pixelRayHere(uvec2(column, line))));
+    return mirrorOff(lens, mirrorDepth(lens, m.linear, m.dLinear, share),
+                     mirrorDepth(lens, m.linear, m.dLinear, share - m.onePixel), s.depth, abs(dot(octDecode(s.normal), toEye)));
 }
 
 vec3 mirrored(uvec2 pixel) {

@@ -2,15 +2,15 @@
 //
 // The mirror ray of a pixel is followed across the picture in even steps, its depth by what is linear there (lens.h),
 // until it is behind what a pixel shows and was in front of the picture a step before; halvings of that step find the
-// place. Met is what has the ray in the plane of what that pixel shows, within a pixel and what the ray goes on towards
-// it in one; where it is farther from it (twice that), it passes behind, and goes on. (Depth would not tell: of grazing
-// ground one pixel is far behind the next.)
+// place. Met is what the ray is behind by no more than what its depth and that of the surface change in a pixel; where
+// it is farther behind (twice that) it passes, and goes on. (Of grazing ground one pixel is far behind the next, of
+// what faces the eye it is not: how long a step is would not tell.)
 //
 //        eye ------> o surface          from o on: in front, in front, behind: between those two it is met
 //                     \_ . _ . _ x
 //
 // How much of the light that is met counts is a product of shares that fade to nothing: with roughness, for rays that
-// come back to the eye, at the picture's border, at the end of the way, off the plane of what is met, and where that
+// come back to the eye, at the picture's border, at the end of the way, as it is farther behind, and where that
 // shows another side than the ray meets. So nothing comes or goes at once, and what does not count leaves the
 // surroundings where they were.
 //
@@ -27,11 +27,12 @@ struct ReflectionConstants {
     uint steps;   // of the longest rays; shorter ones have one a pixel
 };
 
-const float kMirrorRoughest = 0.3f;   // from this roughness on surfaces mirror nothing of the picture ...
-const float kMirrorSmoothest = 0.1f;  // ... up to this one they mirror all of it
-const float kMirrorLift = 1.0f;       // px that rays begin above their surface
-const float kMirrorTowards = 0.9f;    // of the way to the eye's plane
-const float kMirrorBorder = 0.0625f;  // of the picture's shorter side: there it fades
+const float kMirrorRoughest = 0.3f;    // from this roughness on surfaces mirror nothing of the picture ...
+const float kMirrorSmoothest = 0.1f;   // ... up to this one they mirror all of it
+const float kMirrorLift = 1.0f;        // px that rays begin above their surface
+const float kMirrorTowards = 0.9f;     // of the way to the eye's plane
+const float kMirrorBorder = 0.0625f;   // of the picture's shorter side: there it fades
+const float kMirrorGrazing = 0.0625f;  // cosine to the eye from which on surfaces are as deep as that
 const uint kMirrorHalvings = 6u;
 const uint kMirrorTries = 4u;  // things that rays pass behind at most, and one more
 
@@ -98,12 +99,13 @@ SHARED_FN float mirrorDepth(Lens lens, float linear, float dLinear, float share)
 SHARED_FN int mirrorPixel(float at, float size) { return int(min(max(0.0f, at), size - 1.0f)); }
 // How far behind what a pixel shows a ray is; below 0 where it is not.
 SHARED_FN float mirrorBehind(float z, float depth) { return depth > 0.0f ? z - depth : -1.0f; }
-// How far a ray is from the plane of what a pixel shows, in shares of what it is at most where it meets that. `place`
-// and `n`: of the pixel; `at`: of the ray, `before`: of it one pixel before.
-SHARED_FN float mirrorOff(Lens lens, vec3 place, vec3 n, vec3 at, vec3 before) {
-    const float off = dot(n, vec3(at.x - place.x, at.y - place.y, at.z - place.z));
-    const float on = dot(n, vec3(at.x - before.x, at.y - before.y, at.z - before.z));
-    return abs(off) / (abs(on) + lensDepth(lens, place.z) / lens.focal);
+// How far a ray is behind what a pixel shows, in shares of what it is at most where it meets that: what the depth of
+// the ray (`z`; `zBefore`: one pixel before) and that of the surface change in a pixel. `depth`, `facing`: of the
+// surface; its normal's cosine to the eye.
+SHARED_FN float mirrorOff(Lens lens, float z, float zBefore, float depth, float facing) {
+    const float slope = sqrt(max(1.0f - facing * facing, 0.0f)) / max(facing, kMirrorGrazing);
+    const float pixel = lensDepth(lens, depth) / lens.focal;
+    return abs(z - depth) / (abs(z - zBefore) + (1.0f + slope) * pixel);
 }
 const float kMirrorFarOff = 2.0f;  // from there on it passes
 

@@ -55,7 +55,7 @@ class MirrorImages {
   private:
     struct Met {
         dvec2 at{0};
-        double depth = 0, off = 0;  ///< off: the plane there, of what may be
+        double depth = 0, off = 0;  ///< off: offWall
     };
     struct Ray {
         dvec2 from{0}, to{0};  ///< px
@@ -98,16 +98,14 @@ class MirrorImages {
         r.pixels = std::max({std::abs(r.to.x - r.from.x), std::abs(r.to.y - r.from.y), 1.0});
         return r;
     }
-    dvec3 placeAlong(const Ray& r, double share) const {
-        return viewRay(view_, r.from + share * (r.to - r.from)).at(depthAlong(r, share));
-    }
-    /// How far the ray is from the plane of what a pixel shows, of a pixel there and what it goes on towards it in one.
-    double offPlane(const Ray& r, double share, int x, int y) const {
+    /// How far behind what a pixel shows the ray is, of what the depths of both change in a pixel.
+    double offWall(const Ray& r, double share, int x, int y) const {
         const dvec2 middle(x + 0.5, y + 0.5);
-        const dvec3 n = normalAt(*level_.at(x, y), middle, view_), here = placeAlong(r, share);
-        const double off = glm::dot(n, here - viewRay(view_, middle).at(depthOf(x, y))),
-                     on = glm::dot(n, here - placeAlong(r, share - 1 / r.pixels));
-        return std::abs(off) / (std::abs(on) + 1 / pixelsAt(view_, depthOf(x, y)));
+        const double depth = depthOf(x, y), z = std::max(depthAlong(r, share), depth);
+        const double facing = std::abs(
+            glm::dot(normalAt(*level_.at(x, y), middle, view_), sightOf(view_, viewRay(view_, middle).at(depth))));
+        const double slope = std::sqrt(std::max(1 - facing * facing, 0.0)) / std::max(facing, 1.0 / 16);
+        return (z - depth) / (std::abs(z - depthAlong(r, share - 1 / r.pixels)) + (1 + slope) / pixelsAt(view_, depth));
     }
 
     /// Through one pixel after another, to the first wall that the ray goes behind.
@@ -130,7 +128,7 @@ class MirrorImages {
             const double entry = depthAlong(r, share), exit = depthAlong(r, end);
             if (wall > 0 && isInFront && std::max(entry, exit) > wall) {
                 const double at = entry > wall ? share : std::clamp(shareAtDepth(r, wall), share, end);
-                const double off = offPlane(r, at, int(low.x), int(low.y));
+                const double off = offWall(r, at, int(low.x), int(low.y));
                 if (off < 2) return Met{r.from + at * way, std::max(entry, wall), off};
             }
             isInFront = !(wall > 0 && exit > wall);
