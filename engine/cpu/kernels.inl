@@ -11,7 +11,6 @@
 #include "shaders/shared/pack.h"
 #include "shaders/shared/patch_map.h"
 #include "shaders/shared/pyramid.h"
-#include "shaders/shared/reflection.h"
 #include "shaders/shared/shade.h"
 #define SHARED_SHADOW [[maybe_unused]] const float *shadowDepths, [[maybe_unused]] const uint *shadowThrough,
 #define SHARED_SHADOW_USE shadowDepths, shadowThrough,
@@ -420,8 +419,6 @@ void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
 
 #include "engine/cpu/occlusion.inl"
 
-#include "engine/cpu/reflection.inl"
-
 }  // namespace
 
 extern const Kernels STIPPLE_KERNELS, STIPPLE_KERNELS_ORTHOGRAPHIC;
@@ -463,7 +460,6 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               openRow,
                               occludeRow,
                               aoMeanRow,
-                              aoSpreadRow,
-                              reflectRow};
+                              aoSpreadRow};
 
 }  // namespace stipple::cpu
