@@ -84,6 +84,17 @@ TEST_F(Api, DrawsThePicturesOfTheProgram) {
     EXPECT_NE(other->rgba, image->rgba);
 }
 
+/// `*` and `->` without looking first end the program with the error's line, and not somewhere else later.
+TEST_F(Api, AnErrorThatIsTakenForAValueSaysWhichOneItWas) {
+    EXPECT_DEATH((void)*stipple::Scene::open({"/nowhere/scan.laz"}), "stipple: /nowhere/scan.laz: No such file");
+    const stipple::Result<int> none = stipple::Error{ErrorKind::input, "cut off", "a.las", ""};
+    EXPECT_DEATH((void)*none, "stipple: a.las: cut off");
+    stipple::Result<std::string> text = stipple::Error{ErrorKind::input, "cut off", "b.las", "copy it again"};
+    EXPECT_DEATH((void)text->size(), "stipple: b.las: cut off .copy it again.");
+    text = std::string("fine");
+    EXPECT_EQ(text->size() + size_t(*stipple::Result<int>(3)), 7u);
+}
+
 TEST_F(Api, SeveralScenesAndRenderersShareADeviceAndEndInAnyOrder) {
     auto opened = stipple::Device::open("cpu", 2);
     ASSERT_TRUE(opened);

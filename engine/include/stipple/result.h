@@ -1,9 +1,12 @@
 // What can fail gives a Result: a value, or an Error that is one line for a person. Nothing of this library throws but
-// std::bad_alloc, and nothing prints.
+// std::bad_alloc, and nothing prints, but for one mistake of a program: `*` and `->` of a Result without a value end it
+// with that line (std::abort).
 #pragma once
 
 #include <stipple/namespace.h>
 
+#include <cstdio>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <utility>
@@ -35,14 +38,19 @@ class Result {
     T& value() & { return value_.value(); }
     const T& value() const& { return value_.value(); }
     T&& value() && { return std::move(value_).value(); }
-    T& operator*() & { return *value_; }
-    const T& operator*() const& { return *value_; }
-    T&& operator*() && { return *std::move(value_); }
-    T* operator->() { return &*value_; }
-    const T* operator->() const { return &*value_; }
+    T& operator*() & { return checked(), *value_; }
+    const T& operator*() const& { return checked(), *value_; }
+    T&& operator*() && { return checked(), *std::move(value_); }
+    T* operator->() { return checked(), &*value_; }
+    const T* operator->() const { return checked(), &*value_; }
     const Error& error() const { return error_; }
 
   private:
+    void checked() const {
+        if (value_) return;
+        std::fprintf(stderr, "stipple: %s\n", error_.line().c_str());
+        std::abort();
+    }
     std::optional<T> value_;
     Error error_;
 };
