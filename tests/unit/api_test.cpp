@@ -95,6 +95,19 @@ TEST_F(Api, AnErrorThatIsTakenForAValueSaysWhichOneItWas) {
     EXPECT_EQ(text->size() + size_t(*stipple::Result<int>(3)), 7u);
 }
 
+TEST_F(Api, WhatHasBeenMovedFromIsACopy) {
+    auto opened = stipple::Device::open("cpu", 2);
+    ASSERT_TRUE(opened);
+    const stipple::Device device = std::move(*opened);
+    EXPECT_EQ(opened->name(), device.name());
+    stipple::Scene scene = sceneOf("moved.ply");
+    const stipple::Scene other = std::move(scene);
+    const auto here = renderer(*opened, scene).render(other.overview(1), 64, 64);
+    const auto there = renderer(device, other).render(other.overview(1), 64, 64);
+    ASSERT_TRUE(here && there);
+    EXPECT_EQ(here->rgba, there->rgba);
+}
+
 TEST_F(Api, SeveralScenesAndRenderersShareADeviceAndEndInAnyOrder) {
     auto opened = stipple::Device::open("cpu", 2);
     ASSERT_TRUE(opened);

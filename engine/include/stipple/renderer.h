@@ -15,6 +15,9 @@ namespace stipple::v1 {
 /// draw on it: a second one gets an error (usage).
 class STIPPLE_API Device {
   public:
+    /// Copies share what they are of; what has been moved from is a copy, too.
+    Device(const Device&) = default;
+    Device& operator=(const Device&) = default;
     /// auto (a GPU if there is one), cpu, gpu, gpu:NAME, or reference (fp64, slow: what the others are held to).
     static Result<Device> open(const std::string& name = "auto", unsigned threads = 0);
     std::string name() const;

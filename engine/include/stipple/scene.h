@@ -32,6 +32,9 @@ struct Place {
 /// A copy shares what is opened. What a Renderer draws stays as it was when that was made.
 class STIPPLE_API Scene {
   public:
+    /// Copies share what they are of; what has been moved from is a copy, too.
+    Scene(const Scene&) = default;
+    Scene& operator=(const Scene&) = default;
     /// A .stipple file; a glTF or OBJ scene; or scans, which are built into the user's cache first, and found there the
     /// next time.
     static Result<Scene> open(const std::vector<std::string>& inputs, const OpenSettings& settings = {});

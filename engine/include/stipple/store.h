@@ -12,6 +12,9 @@ namespace stipple::v1 {
 
 class STIPPLE_API Store {
   public:
+    /// Copies share what they are of; what has been moved from is a copy, too.
+    Store(const Store&) = default;
+    Store& operator=(const Store&) = default;
     static Result<Store> open(const std::string& path);
 
     std::string primitive() const;  ///< point, triangle, segment or patch

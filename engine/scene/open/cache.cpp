@@ -8,6 +8,7 @@
 #include <map>
 
 #include "engine/base/hash.h"
+#include "engine/base/one_at_a_time.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
@@ -54,18 +55,21 @@ std::string identityOfScene(const std::string& path) {
         std::vector<std::string> files;
         std::string identity;
     };
-    static std::map<std::string, Known> known;  // (scenes are opened by one thread)
-    Known& own = known[path];
-    const auto identity = [&] {
-        std::string text = identityOf(path);
-        for (const std::string& other : own.files) text += identityOf(other);
-        return text;
-    };
-    if (identity() != own.identity) {
-        own.files = scene::filesOf(path);
-        own.identity = identity();
-    }
-    return own.identity;
+    static std::map<std::string, Known> known;
+    static OneAtATime alone;  // any thread may open scenes
+    return alone([&]() -> std::string {
+        Known& own = known[path];
+        const auto identity = [&] {
+            std::string text = identityOf(path);
+            for (const std::string& other : own.files) text += identityOf(other);
+            return text;
+        };
+        if (identity() != own.identity) {
+            own.files = scene::filesOf(path);
+            own.identity = identity();
+        }
+        return own.identity;
+    });
 }
 
 Result<std::string> keyOf(const std::vector<std::string>& inputs, const OpenSettings& build, const std::string& part,
