@@ -157,7 +157,13 @@ FrameInfo infoOf(const FrameCounters& c) {
     render::setSway(frame.draw.wind, r.state->hierarchies, r.state->instances, r.state->groups);
     const lod::View view = scene::makeView(eye, width, height, scene::nearPlaneOf(r.scene));
     if (waits) {
-        STIPPLE_TRY(render::renderUntilComplete(*r.state, view, frame));
+        STIPPLE_ASSIGN(const bool isWhole, render::renderUntilComplete(*r.state, view, frame));
+        if (!isWhole && r.state->counters.failures > 0) {
+            r.info = infoOf(r.state->counters);
+            return fail(::stipple::ErrorKind::input,
+                        "a part of the scene cannot be read: " + r.state->streamer->lastFailure(), "",
+                        "renderFrame draws what is there");
+        }
     } else {
         STIPPLE_TRY(render::renderFrame(*r.state, view, frame));
     }

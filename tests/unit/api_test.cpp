@@ -86,6 +86,7 @@ TEST_F(Api, DrawsThePicturesOfTheProgram) {
 
 /// `*` and `->` without looking first end the program with the error's line, and not somewhere else later.
 TEST_F(Api, AnErrorThatIsTakenForAValueSaysWhichOneItWas) {
+    GTEST_FLAG_SET(death_test_style, "threadsafe");  // (libraries have threads by now)
     EXPECT_DEATH((void)*stipple::Scene::open({"/nowhere/scan.laz"}), "stipple: /nowhere/scan.laz: No such file");
     const stipple::Result<int> none = stipple::Error{ErrorKind::input, "cut off", "a.las", ""};
     EXPECT_DEATH((void)*none, "stipple: a.las: cut off");
@@ -93,6 +94,29 @@ TEST_F(Api, AnErrorThatIsTakenForAValueSaysWhichOneItWas) {
     EXPECT_DEATH((void)text->size(), "stipple: b.las: cut off .copy it again.");
     text = std::string("fine");
     EXPECT_EQ(text->size() + size_t(*stipple::Result<int>(3)), 7u);
+}
+
+/// A picture of a damaged store is not taken for one of a whole one.
+TEST_F(Api, ChunksThatCannotBeReadAreAnErrorOfRender) {
+    ASSERT_TRUE(stipple::build({writeBall("damaged.ply")}, at("damaged.stipple")));
+    {
+        std::fstream file(at("damaged.stipple"), std::ios::in | std::ios::out | std::ios::binary);
+        const auto middle = std::filesystem::file_size(at("damaged.stipple")) / 2;
+        for (uint64_t k = 0; k < 64; ++k) {
+            file.seekg(static_cast<std::streamoff>(middle + k));
+            const auto byte = static_cast<char>(file.get() ^ 0x55);
+            file.seekp(static_cast<std::streamoff>(middle + k));
+            file.put(byte);
+        }
+    }
+    auto device = stipple::Device::open("cpu", 2);
+    auto scene = stipple::Scene::open({at("damaged.stipple")});
+    ASSERT_TRUE(device && scene);
+    auto drawn = renderer(*device, *scene);
+    const auto image = drawn.render(scene->overview(1), 256, 256);
+    ASSERT_FALSE(image);
+    EXPECT_EQ(image.error().kind, ErrorKind::input);
+    EXPECT_NE(image.error().line().find("cannot be read"), std::string::npos) << image.error().line();
 }
 
 TEST_F(Api, WhatHasBeenMovedFromIsACopy) {
