@@ -98,7 +98,8 @@ bool isLegalTransition(ChunkState from, ChunkState to) {
 
 Streamer::Streamer(Executor& executor, ChunkSink& sink, StreamSettings settings)
     : executor_(executor), executorLife_(executor.life()), sink_(sink), settings_(settings) {
-    ends_.before = ends_.after = {kNoSource, 0};
+    groups_.emplace_back();
+    groups_.front().end.before = groups_.front().end.after = {kGroupEnd, 0};
 }
 
 Streamer::~Streamer() {
@@ -233,22 +234,40 @@ void Streamer::linkAfter(ChunkKey before, ChunkKey key) {
     lifeOf(after).before = key;
 }
 
-/// From both ends: a parent is in use still, or was given up with the child that made room for it.
-ChunkKey Streamer::placeOf(uint64_t lastUsed) {
-    ChunkKey early = ends_.after, late = ends_.before;
-    for (;;) {
-        if (late.source == kNoSource || lifeOf(late).lastUsed <= lastUsed) return late;
-        if (lifeOf(early).lastUsed > lastUsed) return lifeOf(early).before;
-        late = lifeOf(late).before;
-        early = lifeOf(early).after;
+void Streamer::link(ChunkKey key) { linkAfter(groups_[lifeOf(key).used].end.before, key); }
+
+uint32_t Streamer::groupOfFrame() {
+    const ChunkKey last = groups_.front().end.before;  // an end: of the newest group, or of the list
+    if (last.chunk != 0 && last.source == kGroupEnd && groups_[last.chunk].frame == frame_) return last.chunk;
+    if (spareGroups_.empty()) {
+        spareGroups_.push_back(static_cast<uint32_t>(groups_.size()));
+        groups_.emplace_back();
+        spareGroups_.reserve(groups_.capacity());
     }
+    const uint32_t group = spareGroups_.back();
+    spareGroups_.pop_back();
+    groups_[group].frame = frame_;
+    linkAfter(last, {kGroupEnd, group});
+    return group;
+}
+
+void Streamer::leaveGroup(ChunkLife& life) {
+    const uint32_t group = std::exchange(life.used, kNever);
+    if (group == kNever || --groups_[group].chunks > 0) return;
+    unlink({kGroupEnd, group});
+    spareGroups_.push_back(group);
 }
 
 void Streamer::use(ChunkKey key) {
-    lifeOf(key).lastUsed = frame_;
-    if (!isEvictable(key)) return;
+    ChunkLife& life = lifeOf(key);
+    if (life.state != ChunkState::resident || lod::isOfRoot(*sources_[key.source].hierarchy, key.chunk)) return;
+    const uint32_t group = groupOfFrame();
+    if (life.used == group) return;
     unlink(key);
-    linkAfter(ends_.before, key);
+    leaveGroup(life);
+    life.used = group;
+    ++groups_[group].chunks;
+    if (isEvictable(key)) link(key);
 }
 
 /// A chunk is not evicted before those that build on it.
@@ -259,13 +278,14 @@ void Streamer::countInParents(ChunkKey key, int change) {
         ChunkLife& life = source.chunks[above];
         if (life.residentBelow == 0 && change > 0) unlink(parent);
         life.residentBelow = static_cast<uint16_t>(life.residentBelow + change);
-        if (change < 0 && isEvictable(parent)) linkAfter(placeOf(life.lastUsed), parent);
+        if (change < 0 && isEvictable(parent)) link(parent);
     });
 }
 
 void Streamer::evict(ChunkKey key) {
     Source& source = sources_[key.source];
     unlink(key);
+    leaveGroup(lifeOf(key));
     sink_.evict(key);
     setState(key, ChunkState::absent);
     countInParents(key, -1);
@@ -275,9 +295,10 @@ void Streamer::evict(ChunkKey key) {
 
 bool Streamer::makeRoom(uint64_t bytes) {
     while (counters_.residentBytes + bytes > settings_.residentBytes) {
-        const ChunkKey oldest = ends_.after;
-        if (oldest.source == kNoSource) return false;
-        if (lifeOf(oldest).lastUsed >= frame_) return false;  // what this frame keeps is never evicted
+        ChunkKey oldest = groups_.front().end.after;
+        while (oldest.source == kGroupEnd && oldest.chunk != 0) oldest = lifeOf(oldest).after;
+        if (oldest.source == kGroupEnd) return false;
+        if (groups_[lifeOf(oldest).used].frame >= frame_) return false;  // what this frame keeps is never evicted
         evict(oldest);
     }
     return true;
@@ -398,7 +419,10 @@ void Streamer::makeRoomFor(const lod::ResidentPlan& plan) {
             others_.push_back({s, n});
             together += lod::decodedBytes(*sources_[s].hierarchy, n);
         }
-    const auto last = [&](ChunkKey k) { return sources_[k.source].chunks[k.chunk].lastUsed; };
+    const auto last = [&](ChunkKey k) {
+        const uint32_t group = lifeOf(k).used;
+        return group == kNever ? ~uint64_t{0} : groups_[group].frame;  // chunks of roots go last
+    };
     // What builds on others was not used later than they, and has the higher number.
     std::sort(others_.begin(), others_.end(), [&](ChunkKey a, ChunkKey b) {
         if (last(a) != last(b)) return last(a) < last(b);

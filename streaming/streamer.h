@@ -104,11 +104,21 @@ class Streamer {
     const std::string& lastFailure() const { return lastFailure_; }
 
   private:
+    static constexpr uint32_t kGroupEnd = 0xffffffffu;  ///< as the source of a key: its chunk is a group
+    static constexpr uint32_t kNever = 0xffffffffu;
     struct ChunkLife {
         ChunkState state = ChunkState::absent;
         uint16_t residentBelow = 0;  ///< that build on it
-        uint64_t lastUsed = 0, lastWanted = 0, retryAt = 0;
+        uint32_t used = kNever;      ///< the group of the frame that used it last
+        uint64_t lastWanted = 0, retryAt = 0;
         ChunkKey before, after;  ///< in the list of what may be evicted, least recently used first; alone: itself
+    };
+    /// What one frame was the last to use: of the list, what stands before `end` and behind the end of the group
+    /// before. A chunk that becomes evictable finds its place in the list by it, without a look at others.
+    struct Group {
+        uint64_t frame = 0;
+        uint32_t chunks = 0;  ///< evictable or not
+        ChunkLife end;
     };
     struct PageLife {
         bool isRequested = false;
@@ -146,23 +156,28 @@ class Streamer {
     void giveBack(Request& request);
     void evict(ChunkKey key);
     void countInParents(ChunkKey key, int change);
-    ChunkLife& lifeOf(ChunkKey key) { return key.source == kNoSource ? ends_ : sources_[key.source].chunks[key.chunk]; }
+    ChunkLife& lifeOf(ChunkKey key) {
+        return key.source == kGroupEnd ? groups_[key.chunk].end : sources_[key.source].chunks[key.chunk];
+    }
     /// Resident, and nobody's parent: in the list, unless it is of the root.
     bool isEvictable(ChunkKey key) const;
     void unlink(ChunkKey key);
     void linkAfter(ChunkKey before, ChunkKey key);
-    /// Where what was used in that frame belongs: behind this one.
-    ChunkKey placeOf(uint64_t lastUsed);
+    /// The last of its group.
+    void link(ChunkKey key);
     /// It is in use now.
     void use(ChunkKey key);
+    /// Nobody's use counts any more.
+    void leaveGroup(ChunkLife& life);
+    uint32_t groupOfFrame();
 
     Executor& executor_;
     std::weak_ptr<const void> executorLife_;  ///< one that is gone has finished what it had
     ChunkSink& sink_;
     StreamSettings settings_;
-    static constexpr uint32_t kNoSource = 0xffffffffu;
     std::deque<Source> sources_;  ///< tasks look at them, wherever others are added
-    ChunkLife ends_;              ///< of the list: after it comes its first, before it its last
+    std::vector<Group> groups_;   ///< the first one's end is that of the list, a ring: after it comes the first chunk
+    std::vector<uint32_t> spareGroups_;
     std::vector<std::vector<uint8_t>> drawable_;
     // What a frame needs while chunks come and go is used again, so that its thread allocates nothing once warm.
     std::vector<std::unique_ptr<Request>> requests_;

@@ -54,8 +54,9 @@ template <typename Work>
 Result<BuildReport> run(const std::string& store, const BuildSettings& settings, const Work& work) {
     if (const auto fine = checkOutput(store); !fine) return v1::given(fine.error());
     const auto executor = makeTbbExecutor(static_cast<int>(settings.threads));
-    ::stipple::Progress progress(ProgressStyle::silent, callOf(settings.listener));
-    ::stipple::Result<lod::BuildReport> built = work(*executor, progress);
+    const scene::OpenSettings how = settingsOf(settings);
+    ::stipple::Progress progress(ProgressStyle::silent, how.onProgress);
+    ::stipple::Result<lod::BuildReport> built = work(how, *executor, progress);
     if (!built) return v1::given(built.error());
     return given(std::move(*built));
 }
@@ -143,8 +144,8 @@ lod::PointSource taken(const PointSource& source) {
 Result<BuildReport> build(const std::vector<std::string>& inputs, const std::string& store,
                           const BuildSettings& settings) {
     if (inputs.empty()) return Error{ErrorKind::usage, "there is nothing to build from", "inputs", ""};
-    return run(store, settings, [&](Executor& executor, ::stipple::Progress& progress) {
-        return scene::buildAny(inputs, store, settingsOf(settings), executor, progress);
+    return run(store, settings, [&](const scene::OpenSettings& how, Executor& executor, ::stipple::Progress& progress) {
+        return scene::buildAny(inputs, store, how, executor, progress);
     });
 }
 
@@ -158,8 +159,8 @@ Result<BuildReport> buildBytes(const std::vector<Bytes>& inputs, const std::stri
         if (input.count == 0) return Error{ErrorKind::input, "is empty", input.name, "is the download complete?"};
         sources.push_back(std::make_shared<const CallersBytes>(input));
     }
-    return run(store, settings, [&](Executor& executor, ::stipple::Progress& progress) {
-        return scene::buildBytes(sources, resolverOf(resolve), store, settingsOf(settings), executor, progress);
+    return run(store, settings, [&](const scene::OpenSettings& how, Executor& executor, ::stipple::Progress& progress) {
+        return scene::buildBytes(sources, resolverOf(resolve), store, how, executor, progress);
     });
 }
 
@@ -167,10 +168,10 @@ Result<BuildReport> buildPoints(const PointSource& source, const std::string& st
     if (!source.read || source.parts.empty())
         return Error{ErrorKind::usage, "has no points to read", source.name, "set parts and read"};
     return run(store, settings,
-               [&](Executor& executor, ::stipple::Progress& progress) -> ::stipple::Result<lod::BuildReport> {
-                   scene::OpenSettings how = settingsOf(settings);
-                   how.leftovers = lod::Leftovers::replace;  // nobody knows whether they are of the same points
+               [&](const scene::OpenSettings& how, Executor& executor,
+                   ::stipple::Progress& progress) -> ::stipple::Result<lod::BuildReport> {
                    STIPPLE_ASSIGN(lod::BuildSettings own, how.settings());
+                   own.leftovers = lod::Leftovers::replace;  // nobody knows whether they are of the same points
                    own.open = [&](const std::string&, const lod::ReadOptions&) -> ::stipple::Result<lod::PointSource> {
                        return taken(source);
                    };

@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
 #include <cmath>
+#include <memory>
+
+#include "engine/base/one_at_a_time.h"
 
 namespace stipple::v1 {
 
@@ -31,19 +35,24 @@ Camera given(const scene::Camera& camera) {
     return out;
 }
 
-ProgressCall callOf(const Listener& listener) {
-    if (!listener.progress) return {};
-    return [call = listener.progress](const ProgressReport& r) { call({r.stage, r.fraction, r.secondsLeft}); };
-}
-
 scene::OpenSettings openSettings(uint64_t memoryBytes, unsigned threads, uint64_t surfels, const Listener& listener) {
     scene::OpenSettings settings;
     settings.memory = fmt::format("{}", memoryBytes);
     settings.threads = static_cast<int>(threads);
     settings.surfels = surfels;
-    settings.say = settings.loss = listener.note;
-    settings.onProgress = callOf(listener);
-    settings.isStopped = listener.isStopped ? listener.isStopped : [] { return false; };
+    const auto turns = std::make_shared<OneAtATime>();
+    if (listener.note)
+        settings.say =
+            settings.loss = [turns, call = listener.note](const std::string& line) { (*turns)([&] { call(line); }); };
+    if (listener.progress)
+        settings.onProgress = [turns, call = listener.progress](const ProgressReport& r) {
+            (*turns)([&] { call({r.stage, r.fraction, r.secondsLeft}); });
+        };
+    const auto isOver = std::make_shared<std::atomic<bool>>(false);
+    settings.isStopped = [turns, isOver, call = listener.isStopped] {
+        if (call && !*isOver && (*turns)(call)) *isOver = true;
+        return isOver->load();
+    };
     return settings;
 }
 

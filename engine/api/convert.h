@@ -27,9 +27,8 @@ Camera given(const scene::Camera& camera);
 /// Error (usage): what is no camera.
 ::stipple::Result<scene::Camera> taken(const Camera& camera);
 
-/// Tells `listener` what the engine says. (It must outlive what is given.)
-ProgressCall callOf(const Listener& listener);
-/// Sizes in bytes, threads, and who is told.
+/// Sizes in bytes, threads, and who is told: one call at a time, whatever threads it comes from; a stop that was asked
+/// for once is one for good.
 scene::OpenSettings openSettings(uint64_t memoryBytes, unsigned threads, uint64_t surfels, const Listener& listener);
 
 }  // namespace stipple::v1

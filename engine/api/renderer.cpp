@@ -1,9 +1,13 @@
 // Devices, and pictures on them.
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstring>
 
 #include "engine/api/devices.h"
 #include "engine/api/held.h"
+#include "engine/base/process.h"
+#include "engine/base/words.h"
 #include "engine/image/coverage.h"
 #include "engine/render/draw_list.h"
 #include "engine/render/frame.h"
@@ -145,6 +149,20 @@ FrameInfo infoOf(const FrameCounters& c) {
     return info;
 }
 
+/// Why the view has not all that it wants.
+::stipple::Result<void> incomplete(const Renderer::Held& r, bool isWhole) {
+    constexpr const char* kHint = "renderFrame draws what is there";
+    const auto over = [](const std::string& what) { return fail(::stipple::ErrorKind::budget, what, "", kHint); };
+    const FrameCounters& c = r.state->counters;
+    if (!isWhole && c.failures > 0)
+        return fail(::stipple::ErrorKind::input,
+                    "a part of the scene cannot be read: " + r.state->streamer->lastFailure(), "", kHint);
+    if (c.budgetTruncated) return over("the coarsest level of the scene has more records than budgetRecords");
+    return over(fmt::format("{} of {} that the view wants do not fit into residentBytes, {}: an error of {:.2f} px",
+                            c.nodesMissing, counted(c.nodesMissing + c.nodesDrawn, "node"),
+                            humanBytes(r.state->streamer->residentLimit()), c.tauEffectivePixels));
+}
+
 /// `waits`: until nothing is missing.
 ::stipple::Result<void> draw(Renderer::Held& r, const Camera& camera, uint32_t width, uint32_t height,
                              const RenderSettings& settings, bool waits) {
@@ -158,12 +176,8 @@ FrameInfo infoOf(const FrameCounters& c) {
     const lod::View view = scene::makeView(eye, width, height, scene::nearPlaneOf(r.scene));
     if (waits) {
         STIPPLE_ASSIGN(const bool isWhole, render::renderUntilComplete(*r.state, view, frame));
-        if (!isWhole && r.state->counters.failures > 0) {
-            r.info = infoOf(r.state->counters);
-            return fail(::stipple::ErrorKind::input,
-                        "a part of the scene cannot be read: " + r.state->streamer->lastFailure(), "",
-                        "renderFrame draws what is there");
-        }
+        r.info = infoOf(r.state->counters);
+        if (!r.info.isComplete) return incomplete(r, isWhole);
     } else {
         STIPPLE_TRY(render::renderFrame(*r.state, view, frame));
     }

@@ -9,7 +9,8 @@
 
 namespace stipple {
 
-LockFile::LockFile(LockFile&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+LockFile::LockFile(LockFile&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)), alone_(std::move(other.alone_)) {}
 LockFile::~LockFile() {
     if (descriptor_ >= 0) ::close(descriptor_);
 }
@@ -44,9 +45,24 @@ bool LockFile::set(uint64_t place, short how) const {
     return result == 0 || (errno != EAGAIN && errno != EACCES);
 }
 
-bool LockFile::tryShare(uint64_t place) const { return set(place, F_RDLCK); }
-bool LockFile::tryTake(uint64_t place) const { return set(place, F_WRLCK); }
-void LockFile::release(uint64_t place) const { set(place, F_UNLCK); }
+bool LockFile::tryShare(uint64_t place) const {
+    const std::lock_guard lock(alone_->mutex);
+    return alone_->places.count(place) == 0 && set(place, F_RDLCK);
+}
+
+bool LockFile::tryTake(uint64_t place) const {
+    const std::lock_guard lock(alone_->mutex);
+    if (alone_->places.count(place) > 0 || !set(place, F_WRLCK)) return false;
+    alone_->places.insert(place);
+    return true;
+}
+
+void LockFile::release(uint64_t place) const {
+    const std::lock_guard lock(alone_->mutex);
+    alone_->places.erase(place);
+    set(place, F_UNLCK);
+}
+
 bool LockFile::isHeld(uint64_t place) const {
     struct flock asked = lockOf(place, F_WRLCK);
     return ::fcntl(descriptor_, F_OFD_GETLK, &asked) == 0 && asked.l_type != F_UNLCK;

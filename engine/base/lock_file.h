@@ -3,6 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 
 #include "engine/base/result.h"
@@ -11,7 +14,8 @@ namespace stipple {
 
 class LockFile {
   public:
-    /// Makes the file if it is not there. Two LockFiles of one process are strangers to each other.
+    /// Makes the file if it is not there. Two LockFiles of one process are strangers to each other; threads that share
+    /// one exclude each other where one holds a place alone.
     static Result<LockFile> open(const std::string& path);
     LockFile(LockFile&& other) noexcept;
     LockFile& operator=(LockFile&&) = delete;
@@ -27,9 +31,15 @@ class LockFile {
     bool isHeld(uint64_t place) const;
 
   private:
-    explicit LockFile(int descriptor) : descriptor_(descriptor) {}
+    /// Places that are held alone: the system excludes other descriptors only.
+    struct Alone {
+        std::mutex mutex;
+        std::set<uint64_t> places;
+    };
+    explicit LockFile(int descriptor) : descriptor_(descriptor), alone_(std::make_unique<Alone>()) {}
     bool set(uint64_t place, short how) const;
     int descriptor_ = -1;
+    std::unique_ptr<Alone> alone_;
 };
 
 }  // namespace stipple

@@ -21,8 +21,9 @@ std::vector<std::string> ownPlaces(const std::string& name, const std::string& i
     std::error_code ignored;
     const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
     const auto library = folderOfThisCode();
-    return {(program / name).string(), (program / installed).string(), (library / "stipple" / name).string(),
-            (library / name).string(), built};
+    // What lies beside somebody else's program is not ours.
+    return {(library / "stipple" / name).string(), (library / name).string(), (program / name).string(),
+            (program / installed).string(), built};
 }
 
 }  // namespace stipple

@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "engine/base/byte_source.h"
+#include "engine/base/process.h"
+#include "lod/import/kept.h"
 #include "lod/primitives/mesh_source.h"
 #include "lod/primitives/primitives.h"
 
@@ -30,6 +32,8 @@ struct FormatOptions {
     std::string tempFolder = {};  ///< for what is not held in memory; empty: the system's
     uint64_t memoryBytes = uint64_t{2} << 30;   ///< held as long as what was opened
     uint64_t openingBytes = uint64_t{2} << 30;  ///< only while it is opened
+    std::shared_ptr<Kept> kept = {};  ///< what was made of files that are opened again; none: it is made again
+    std::function<bool()> isStopped = isStopRequested;  ///< what takes long ends soon then
 };
 
 /// Triangles, and what there is to say to a person of how they came about.

@@ -58,14 +58,16 @@ struct FrameInfo {
 
 class STIPPLE_API Renderer {
   public:
-    /// `residentBytes`: of what it keeps on the device; the error rises where that does not suffice.
+    /// `residentBytes`: of what it keeps on the device. Where that does not suffice, `render` is an error (budget), and
+    /// `renderFrame` draws coarser.
     static Result<Renderer> create(const Device& device, const Scene& scene,
                                    uint64_t residentBytes = uint64_t{1} << 30);
     Renderer(Renderer&&) noexcept;
     Renderer& operator=(Renderer&&) noexcept;
     ~Renderer();
 
-    /// Waits for what the view wants: the same picture, whatever was drawn before and however slow the disk is.
+    /// Waits for what the view wants: the same picture, whatever was drawn before and however slow the disk is. Never
+    /// less than that: an error (input: it cannot be read; budget: it does not fit).
     Result<Image> render(const Camera& camera, uint32_t width, uint32_t height, const RenderSettings& settings = {});
     /// Draws at once, with what is there, and asks for the rest: call it once a frame. `image` keeps its memory.
     Result<FrameInfo> renderFrame(const Camera& camera, uint32_t width, uint32_t height, Image& image,

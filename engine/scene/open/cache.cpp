@@ -1,13 +1,11 @@
 #include "engine/scene/open/cache.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <map>
 
-#include "engine/base/hash.h"
 #include "engine/base/one_at_a_time.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
@@ -15,8 +13,8 @@
 #include "engine/scene/open/builds_of_scene.h"
 #include "engine/scene/open/cache_folder.h"
 #include "engine/scene/scene_files.h"
-#include "lod/builder/build_version.h"
 #include "lod/builder/octree/journal.h"
+#include "lod/builder/source_identity.h"
 #include "lod/import/import.h"
 
 namespace stipple::scene {
@@ -30,22 +28,13 @@ namespace {
 std::string settingsText(const OpenSettings& build) {
     const auto& [memory, normals, radii, up, attributes, temp, duplicates, grid, cacheLimit, threads, skipBad,
                  onlyPoints, allowOutside, dropOutliers, surfelWeights, curveRadius, surfels, ranks, material, together,
-                 leftovers, isStopped, told, lost, progressStyle, onProgress] = build;
-    // Not memory, temp, threads, ranks, together, leftovers, and who is told: any give the same. Not attributes: what
-    // is cached has all of them.
+                 leftovers, isStopped, told, lost, progressStyle, onProgress, kept] = build;
+    // Not memory, temp, threads, ranks, together, leftovers, kept, and who is told: any give the same. Not attributes:
+    // what is cached has all of them.
     const std::string of = material ? fmt::format("|{}", lod::identityOf(*material)) : std::string();
     return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}{}{}", normals, radii, up, duplicates, skipBad, onlyPoints,
                        allowOutside, dropOutliers, curveRadius, surfels, of, surfelWeights ? "|weights" : "") +
            (grid.empty() ? "" : "|grid " + grid);
-}
-
-/// Path, size and the times of the last change of content and of place: a copy that keeps its time is another file.
-std::string identityOf(const std::string& path) {
-    std::error_code error;
-    struct stat info {};
-    if (::stat(path.c_str(), &info) != 0) info = {};
-    return fmt::format("|{}|{}|{}.{}|{}.{}", fs::absolute(path, error).lexically_normal().string(), info.st_size,
-                       info.st_mtim.tv_sec, info.st_mtim.tv_nsec, info.st_ctim.tv_sec, info.st_ctim.tv_nsec);
 }
 
 /// Of a scene file and of all that it is made of. Which files these are is kept until one of them changes, so that
@@ -60,8 +49,8 @@ std::string identityOfScene(const std::string& path) {
     return alone([&]() -> std::string {
         Known& own = known[path];
         const auto identity = [&] {
-            std::string text = identityOf(path);
-            for (const std::string& other : own.files) text += identityOf(other);
+            std::string text = lod::sourceIdentity(path);
+            for (const std::string& other : own.files) text += lod::sourceIdentity(other);
             return text;
         };
         if (identity() != own.identity) {
@@ -74,11 +63,11 @@ std::string identityOfScene(const std::string& path) {
 
 Result<std::string> keyOf(const std::vector<std::string>& inputs, const OpenSettings& build, const std::string& part,
                           std::vector<std::string>& notes) {
-    std::string text = fmt::format("{}|{}|{}|{}|{}", part, settingsText(build), STIPPLE_VERSION, lod::kStoreVersion,
-                                   lod::kBuildVersion);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs, &notes));
-    for (const std::string& file : files) text += isSceneFile(file) ? identityOfScene(file) : identityOf(file);
-    return hexDigits(hashBytes(text.data(), text.size()));
+    std::string sources;
+    for (const std::string& file : files)
+        sources += isSceneFile(file) ? identityOfScene(file) : lod::sourceIdentity(file);
+    return lod::cacheKey(sources, fmt::format("{}|{}|{}", part, settingsText(build), STIPPLE_VERSION));
 }
 
 Result<const CacheFolder*> folder() {
@@ -104,9 +93,10 @@ class Lookup {
     Result<StorePtr> open(const StoreMaker& make) {
         STIPPLE_ASSIGN(const uint64_t limit, cacheLimit(build_.cacheLimit));
         sayNotes(notes_);
-        STIPPLE_TRY(cache_.use(key_));
+        STIPPLE_TRY(cache_.use(key_, build_.isStopped));
         if (Result<StorePtr> found = openWhole(); found) return found;
-        STIPPLE_TRY(cache_.lockBuild(key_, [&] { tell("is being built by another process: waiting for it"); }));
+        STIPPLE_TRY(cache_.lockBuild(
+            key_, [&] { tell("is being built by another process: waiting for it"); }, build_.isStopped));
         Result<StorePtr> store = openOrBuild(make, limit);
         cache_.unlockBuild(key_);
         return store;

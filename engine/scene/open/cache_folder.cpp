@@ -15,7 +15,6 @@
 #include <thread>
 
 #include "engine/base/file.h"
-#include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
 
@@ -108,19 +107,20 @@ Result<CacheFolder> CacheFolder::open() {
     return CacheFolder(folder, std::move(*locks));
 }
 
-Result<void> CacheFolder::use(const std::string& key) const {
+Result<void> CacheFolder::use(const std::string& key, const std::function<bool()>& isStopped) const {
     // Only who removes it holds it alone, for a moment (unless it was stopped just then).
     while (!locks_.tryShare(usePlace(key))) {
-        if (isStopRequested()) return interrupted(storePath(key));
+        if (isStopped()) return interrupted(storePath(key));
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
     return {};
 }
 
-Result<void> CacheFolder::lockBuild(const std::string& key, const std::function<void()>& waits) const {
+Result<void> CacheFolder::lockBuild(const std::string& key, const std::function<void()>& waits,
+                                    const std::function<bool()>& isStopped) const {
     for (bool isFirst = true; !locks_.tryTake(buildPlace(key)); isFirst = false) {
         if (isFirst) waits();
-        if (isStopRequested()) return interrupted(storePath(key));
+        if (isStopped()) return interrupted(storePath(key));
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     return {};

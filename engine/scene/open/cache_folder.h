@@ -38,9 +38,11 @@ class CacheFolder {
 
     std::string storePath(const std::string& key) const { return path_ + "/" + key + ".stipple"; }
     /// Nobody removes the store while this object lives. An error if it is interrupted.
-    Result<void> use(const std::string& key) const;
-    /// Waits until nobody else builds that store; `waits` is called once, if it has to. An error if it is interrupted.
-    Result<void> lockBuild(const std::string& key, const std::function<void()>& waits) const;
+    Result<void> use(const std::string& key, const std::function<bool()>& isStopped) const;
+    /// Waits until nobody else builds that store, here or elsewhere; `waits` is called once, if it has to. An error if
+    /// it is interrupted.
+    Result<void> lockBuild(const std::string& key, const std::function<void()>& waits,
+                           const std::function<bool()>& isStopped) const;
     void unlockBuild(const std::string& key) const;
     void writeRecord(const std::string& key, const CacheRecord& record) const;
     std::optional<CacheRecord> readRecord(const std::string& key) const;

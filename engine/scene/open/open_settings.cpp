@@ -33,7 +33,13 @@ ReadSettings OpenSettings::reading() const {
 
 lod::FormatOptions OpenSettings::formatOptions() const {
     const uint64_t bytes = reading().memoryBytes;
-    return {.part = grid, .onlyPoints = onlyPoints, .tempFolder = temp, .memoryBytes = bytes, .openingBytes = bytes};
+    return {.part = grid,
+            .onlyPoints = onlyPoints,
+            .tempFolder = temp,
+            .memoryBytes = bytes,
+            .openingBytes = bytes,
+            .kept = kept,
+            .isStopped = isStopped};
 }
 
 Result<lod::BuildSettings> OpenSettings::settings() const {

@@ -34,11 +34,12 @@ struct OpenSettings {
     std::optional<lod::PointMaterial> material;  ///< of stores of points that are built to a file
     std::shared_ptr<BuildsOfScene> together;     ///< of the scene that is opened: its builds show one progress
     lod::Leftovers leftovers = lod::Leftovers::goOn;
-    std::function<bool()> isStopped = isStopRequested;  ///< of builds
+    std::function<bool()> isStopped = isStopRequested;  ///< of builds and conversions
     Say say;                                            ///< notes
     Say loss;  ///< what is left out of a scene, which is to be told where notes are not wanted, too
     ProgressStyle progressStyle = ProgressStyle::silent;
-    ProgressCall onProgress;  ///< beside that
+    ProgressCall onProgress;                                          ///< beside that
+    std::shared_ptr<lod::Kept> kept = std::make_shared<lod::Kept>();  ///< see FormatOptions
 
     Result<lod::BuildSettings> settings() const;
     /// How scene files are read.

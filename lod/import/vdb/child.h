@@ -2,6 +2,7 @@
 // error here.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -28,7 +29,8 @@ class NamelessFile {
 };
 
 /// Gives the program its request, and `columns` as the file that it writes to or reads from. Waits for its answer;
-/// where a stop is asked for, it is ended. `where`: the file that it is about, for errors.
-Result<nlohmann::json> runVdbProgram(nlohmann::json request, const NamelessFile& columns, const std::string& where);
+/// where `isStopped` (asked ten times a second) says so, it is ended. `where`: the file that it is about, for errors.
+Result<nlohmann::json> runVdbProgram(nlohmann::json request, const NamelessFile& columns, const std::string& where,
+                                     const std::function<bool()>& isStopped);
 
 }  // namespace stipple::lod

@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <list>
 #include <map>
 
 #include "engine/base/file.h"
-#include "engine/base/one_at_a_time.h"
 #include "engine/base/process.h"
 #include "engine/base/words.h"
 #include "lod/import/import.h"
@@ -49,24 +47,14 @@ Result<Conversion> convertNow(const std::string& job, const std::string& path, c
     STIPPLE_ASSIGN(out.ply, NamelessFile::create(more.tempFolder));
     STIPPLE_ASSIGN(out.answer,
                    runVdbProgram({{"job", job}, {"path", path}, {"grid", more.part}, {"memory", more.openingBytes}},
-                                 *out.ply, path));
+                                 *out.ply, path, more.isStopped));
     return out;
 }
 
-/// A build opens a file several times: the last few stay. They take room for temporary files only.
 Result<Conversion> convert(const std::string& job, const std::string& path, const FormatOptions& more) {
-    constexpr size_t kKept = 8;
-    static OneAtATime once;
-    static std::list<std::pair<std::string, Conversion>> kept;
-    const std::string key = fmt::format("{}|{}|{}|{}", job, path, fileIdentity(path), more.part);
-    return once([&]() -> Result<Conversion> {
-        for (const auto& [name, conversion] : kept)
-            if (name == key) return conversion;
-        STIPPLE_ASSIGN(Conversion made, convertNow(job, path, more));
-        kept.emplace_front(key, made);
-        if (kept.size() > kKept) kept.pop_back();
-        return made;
-    });
+    const auto make = [&] { return convertNow(job, path, more); };
+    if (!more.kept) return make();
+    return more.kept->once<Conversion>(fmt::format("vdb|{}|{}|{}|{}", job, path, fileIdentity(path), more.part), make);
 }
 
 /// Beside what is drawn.

@@ -107,7 +107,7 @@ Result<nlohmann::json> writeFile(nlohmann::json request, const Rows& rows, const
     STIPPLE_ASSIGN(OutputFile file, OutputFile::create(path));
     request["path"] = file.temporaryPath();
     request["memory"] = more.openingBytes;
-    STIPPLE_ASSIGN(nlohmann::json answer, runVdbProgram(std::move(request), rows.file(), path));
+    STIPPLE_ASSIGN(nlohmann::json answer, runVdbProgram(std::move(request), rows.file(), path, more.isStopped));
     const auto header = readVdbHeader(file.temporaryPath());
     STIPPLE_ASSIGN(const InputFile written, InputFile::open(file.temporaryPath()));
     if (!header || header->grids.empty() || header->grids.back().end != written.sizeBytes())
