@@ -1,12 +1,11 @@
 // What frames cost here (`stipple study SCENE --calibrate`), and errors chosen by it (`--target-ms`, `--target-error`).
 #pragma once
 
-#include <functional>
 #include <span>
 #include <string>
 
 #include "apps/stipple/common.h"
-#include "apps/study/sweep/plan.h"
+#include "apps/study/calibration/curve.h"
 #include "engine/render/frame.h"
 
 namespace CLI {
@@ -25,10 +24,11 @@ struct TargetOptions {
 /// Of the content of all stores and where they stand.
 uint64_t sceneHash(const OpenedScene& opened);
 
-/// Measures and keeps; prints a table, or JSON.
-Result<void> calibrate(const study::StudyScene& scene, const study::StudySettings& settings,
-                       std::unique_ptr<render::Backend> backend, Executor& executor, bool isJson,
-                       const std::function<Result<void>(uint64_t done, uint64_t total)>& say);
+/// Without samples: of a scene on this machine. The program's version counts, too.
+study::Curve curveHere(uint64_t scene, const std::string& device, int threads);
+/// Where it is kept.
+std::string pathOf(const study::Curve& curve);
+std::string nameOf(const render::Backend& backend);
 
 /// What views have to do once everything is there.
 struct CutLoads {

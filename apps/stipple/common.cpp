@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "apps/stipple/camera_options.h"
+#include "apps/stipple/options.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
@@ -17,10 +18,6 @@
 #include "lod/import/import.h"
 #include "lod/store/colour.h"
 #include "lod/store/file_kind.h"
-#ifdef STIPPLE_WITH_GPU
-#include "apps/stipple/options.h"
-#include "engine/gpu/gpu_backend.h"
-#endif
 
 namespace stipple::app {
 namespace fs = std::filesystem;

@@ -10,6 +10,7 @@
 
 #include "apps/stipple/common.h"
 #include "apps/stipple/options.h"
+#include "apps/stipple/study_commands.h"
 #include "engine/base/process.h"
 #include "engine/base/progress.h"
 
@@ -74,7 +75,7 @@ Result<void> runSelfTestCommand(const SelfTestCommand& o, int& status) {
 
 void setupSelfTest(CLI::App& app, int& status) {
     auto o = std::make_shared<SelfTestCommand>();
-    CLI::App* sub = app.add_subcommand("selftest", "hard cases of precision, on this machine and its devices");
+    CLI::App* sub = app.add_subcommand(kSelfTestCommand.name, kSelfTestCommand.about);
     sub->add_option("--device", o->device, "all (cpu, and gpu if there is one), cpu, gpu or gpu:NAME")
         ->type_name("DEVICE")
         ->capture_default_str();

@@ -6,6 +6,7 @@
 
 #include "apps/stipple/common.h"
 #include "apps/stipple/options.h"
+#include "apps/stipple/study_commands.h"
 #include "apps/stipple/study_scenes.h"
 #include "apps/study/study.h"
 #include "engine/base/process.h"
@@ -70,7 +71,7 @@ Result<void> runSeeds(const StudyCommand& all) {
 void setupStudy(CLI::App& app, int& status) {
     auto o = std::make_shared<StudyCommand>();
     StudyOptions& scenes = o->scenes;
-    CLI::App* sub = app.add_subcommand("study", "what accuracy costs in time, on your scenes");
+    CLI::App* sub = app.add_subcommand(kStudyCommand.name, kStudyCommand.about);
     sub->add_flag("--seeds", o->seeds, "the tables and figures of the papers that the modes stand on, made again");
     sub->add_option("-o,--output", scenes.output,
                     "folder for report.html, study.json, rows.csv; the same command goes on where it was stopped "
