@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "apps/stipple/build_patches.h"
 #include "apps/stipple/calibrate.h"
 #include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"

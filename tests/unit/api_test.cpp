@@ -11,6 +11,7 @@
 
 namespace {
 
+namespace fs = std::filesystem;
 using stipple::ErrorKind;
 using stipple_test::Api;
 
