@@ -37,13 +37,14 @@ class Api : public testing::Test {
         std::ifstream in(path, std::ios::binary);
         return {std::istreambuf_iterator<char>(in), {}};
     }
-    /// 4,000 points of a ball of radius 1 about (x, 0, 0).
-    std::string writeBall(const std::string& name, double x = 0) const {
+    /// Points of a ball of radius 1 about (x, 0, 0).
+    std::string writeBall(const std::string& name, double x = 0, int points = 4000) const {
         std::ofstream out(at(name));
-        out << "ply\nformat ascii 1.0\nelement vertex 4000\nproperty double x\nproperty double y\nproperty double z\n"
+        out << "ply\nformat ascii 1.0\nelement vertex " << points
+            << "\nproperty double x\nproperty double y\nproperty double z\n"
                "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
-        for (int i = 0; i < 4000; ++i) {
-            const double z = 1 - 2 * (i + 0.5) / 4000, r = std::sqrt(1 - z * z), a = 2.399963 * i;
+        for (int i = 0; i < points; ++i) {
+            const double z = 1 - 2 * (i + 0.5) / points, r = std::sqrt(1 - z * z), a = 2.399963 * i;
             out << x + r * std::cos(a) << ' ' << r * std::sin(a) << ' ' << z << ' ' << i % 256 << " 90 200\n";
         }
         return at(name);

@@ -29,6 +29,7 @@ cmake -S "$work/examples" -B "$work/made" -DCMAKE_PREFIX_PATH="$work/usr" -DCMAK
     -DCMAKE_CXX_FLAGS='-Wall -Wextra -Wconversion -Wshadow -Werror' >"$work/configure.log" || { cat "$work/configure.log"; exit 1; }
 cmake --build "$work/made" >"$work/build.log" || { cat "$work/build.log"; exit 1; }
 "$work/made/points" "$work/ball.stipple" 2>/dev/null | grep -q '1000000 points' || fail 'points: other numbers'
+"$work/usr/bin/stipple" study --help | grep -q calibrate || fail "the program of studies is not found"
 "$work/usr/bin/stipple" info --verify "$work/ball.stipple" >/dev/null || fail 'points: the store is not true'
 "$work/made/picture" "$work/ball.stipple" "$work/a.png" | grep -q 'within' || fail 'picture'
 "$work/usr/bin/stipple" render "$work/ball.stipple" -o "$work/b.png" --size 1280x720 --device cpu --quiet
