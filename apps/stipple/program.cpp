@@ -1,5 +1,6 @@
 #include "apps/stipple/program.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -8,6 +9,7 @@
 #include <cstdio>
 #include <exception>
 #include <stdexcept>
+#include <utility>
 
 #include "apps/stipple/common.h"
 #include "apps/stipple/exhaustion.h"
@@ -25,6 +27,13 @@ void addExitCodes(CLI::App& app) {
     app.footer(app.get_footer().empty() ? kExitCodes : app.get_footer() + "\n" + kExitCodes);
     for (CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; }))
         if (!sub->get_name().empty()) addExitCodes(*sub);
+}
+
+/// A closed one would be the number of the next file that is opened, and messages would stand in that. What is written
+/// to standard output still cannot be.
+void holdStandardStreams() {
+    for (const auto& [stream, how] : {std::pair{0, O_RDONLY}, {1, O_RDONLY}, {2, O_WRONLY}})
+        if (::fcntl(stream, F_GETFD) < 0) (void)::open("/dev/null", how);
 }
 
 /// What the commands themselves did not turn into a Result.
@@ -78,6 +87,7 @@ int run(const Program& program, std::vector<std::string> arguments) {
 }  // namespace
 
 int runProgram(int argc, char** argv, const Program& program) {
+    holdStandardStreams();
     exitWhereNothingCatches();
     std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails and is reported, instead of ending the program
     constexpr int kBudget = static_cast<int>(ErrorKind::budget);

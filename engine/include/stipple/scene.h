@@ -29,7 +29,7 @@ struct Place {
     Vec3 translation{0, 0, 0};
 };
 
-/// A copy shares what is opened. What a Renderer draws stays as it was when that was made.
+/// What a Renderer draws stays as it was when that was made.
 class STIPPLE_API Scene {
   public:
     /// Copies share what they are of; what has been moved from is a copy, too.
