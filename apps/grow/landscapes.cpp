@@ -370,8 +370,8 @@ scene::Scene growDemo(const LandscapeOptions& o, const std::string& store) {
     s.nodes.push_back(scan);
     addSun(s);
     // Effects where they belong: shadows of that sun, air between the rows and the far trees, creases of bark and
-    // grass, light that rolls off. Glass and mirrors call for theirs themselves.
-    s.effects.names = {"shadow", "fog", "occlusion", "tone"};
+    // grass, what mirrors show of the picture, light that rolls off. Glass calls for its own itself.
+    s.effects.names = {"shadow", "fog", "occlusion", "reflection", "tone"};
     s.effects.values = {"fog.density=0.0012",   "fog.kind=air",      "fog.colour=176,190,206",
                         "occlusion.radius=0.6", "tone.exposure=1.6", "tone.curve=filmic"};
     return s;

@@ -75,6 +75,7 @@ class CpuBackend final : public render::DrawsAtOnce {
         frame_.wantAll = request.wantDepthAndNormal;
         frame_.hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
+        frame_.mirrored = {};
         frame_.isSmoothing = false;  // whatever became of the frame before
         frame_.hasSmooth =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::smooth) != request.passes.end();

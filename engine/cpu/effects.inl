@@ -115,13 +115,13 @@ void backgroundRow(const FrameConstants& frame, const BackgroundConstants& const
     // Of a row about which the finest level is seen, all are of it.
     float most = 0.0f;
     for (size_t i = 0; i < n; ++i) most = max(most, level[i]);
-    const auto look = [&](uint32_t l, size_t i) {
+    const auto look = [&](uint32_t l, size_t i) __attribute__((always_inline)) {
         const BackdropTaps t =
             backdropTaps(b.first[l], backdropSize(b.width, l), backdropSize(b.height, l), vec2(across[i], down[i]));
         return mixTaps(t, backdropLight(texels[t.at00]), backdropLight(texels[t.at10]), backdropLight(texels[t.at01]),
                        backdropLight(texels[t.at11]));
     };
-    const auto show = [&](size_t i, const vec3& fine, const vec3& coarse, float between) {
+    const auto show = [&](size_t i, const vec3& fine, const vec3& coarse, float between) __attribute__((always_inline)) {
         const vec3 c = backdropShown(b, fine, coarse, between);
         row.behindRed[i] = c.x;
         row.behindGreen[i] = c.y;

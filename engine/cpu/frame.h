@@ -95,8 +95,10 @@ struct Frame {
     size_t smoothPixels = 0;
     /// Without a pyramid: 1 where the row of a tile shows something, all tiles of a row side by side.
     std::vector<uint8_t> shownRows;
-    uint8_t& shownRow(uint32_t x0, uint32_t y) {
-        return shownRows[size_t{y} * ((constants.width + kTile - 1) / kTile) + x0 / kTile];
+    uint8_t& shownRow(uint32_t x0, uint32_t y) { return shownRows[tileRow(x0, y)]; }
+    /// Its place among them.
+    size_t tileRow(uint32_t x0, uint32_t y) const {
+        return size_t{y} * ((constants.width + kTile - 1) / kTile) + x0 / kTile;
     }
     /// Of a row of a tile, once it is resolved.
     bool mayShow(uint32_t x0, uint32_t y, uint32_t n) {
@@ -124,6 +126,13 @@ struct Frame {
         bool areKept = false;       ///< they are those of this frame already
     };
     Shadows shadows;
+
+    /// What light adds of the picture's mirror images, in frames with pass reflection: planes of the picture, ...
+    struct Mirrored {
+        const float *red = nullptr, *green = nullptr, *blue = nullptr;
+        const uint8_t* rows = nullptr;  ///< ... of which only rows of tiles are filled that are 1 here (as shownRows)
+    };
+    Mirrored mirrored;
 
     /// Are there blended discs?
     bool isBlended() const { return mode->blendsSplats && !blocks.empty(); }

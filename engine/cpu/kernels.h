@@ -16,6 +16,7 @@
 #include "shaders/shared/patch.h"
 #include "shaders/shared/patch_splat.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/reflection.h"
 #include "shaders/shared/shadow.h"
 #include "shaders/shared/smooth.h"
 #include "shaders/shared/splat_disc.h"
@@ -291,6 +292,9 @@ struct SurfaceRow {
     bool hasOpacity;    ///< some pixels may be kPixelBlends
     bool hasBehind;     ///< what is not covered shows these, and not one colour
     alignas(64) float behindRed[kTile], behindGreen[kTile], behindBlue[kTile];
+    const float *placeX, *placeY;  ///< px from the principal point; null: where the row is
+    const float *mirroredRed, *mirroredGreen,
+        *mirroredBlue;  ///< what light adds of the picture's mirror images, or null
 };
 /// What of a surface is needed beyond whether there is one, and its colour.
 struct SurfaceWants {
@@ -319,6 +323,21 @@ struct AoPlanes {
     float radius;                         ///< world units
     std::array<float, 16> cosine, sine;   ///< of aoAngle
     size_t at(uint32_t x, uint32_t y) const { return size_t{y + kBorder} * pitch + x + kBorder; }
+};
+
+/// What reflections of the screen are made of: planes over the picture (KeptSurface), and what lights them.
+struct ReflectionInput {
+    shared::ReflectionConstants constants;
+    const float* depth;
+    const uint32_t *normal, *colour, *material;
+    const uint32_t* emissive;  ///< or null
+    LightInput light;
+    ShadowInput shadows;  ///< no slots: none
+    bool hasOcclusion;    ///< of points, too
+};
+/// What light adds to the pixels of a row.
+struct MirroredRow {
+    float *red, *green, *blue;
 };
 
 struct ShadeOutput {
@@ -450,6 +469,9 @@ struct Kernels {
                       uint32_t n);
     void (*aoSpreadRow)(const shared::FrameConstants& f, const AoPlanes& of, const float* depth, const uint32_t* normal,
                         uint32_t x0, uint32_t y, uint32_t n, float* open);
+    /// What a row mirrors of the picture; false, and nothing is written, where that is nothing.
+    bool (*reflectRow)(const shared::FrameConstants& f, const ReflectionInput& in, uint32_t x0, uint32_t y, uint32_t n,
+                       const MirroredRow& out);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

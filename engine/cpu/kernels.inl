@@ -11,6 +11,7 @@
 #include "shaders/shared/pack.h"
 #include "shaders/shared/patch_map.h"
 #include "shaders/shared/pyramid.h"
+#include "shaders/shared/reflection.h"
 #include "shaders/shared/shade.h"
 #define SHARED_SHADOW [[maybe_unused]] const float *shadowDepths, [[maybe_unused]] const uint *shadowThrough,
 #define SHARED_SHADOW_USE shadowDepths, shadowThrough,
@@ -419,6 +420,8 @@ void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
 
 #include "engine/cpu/occlusion.inl"
 
+#include "engine/cpu/reflection.inl"
+
 }  // namespace
 
 extern const Kernels STIPPLE_KERNELS, STIPPLE_KERNELS_ORTHOGRAPHIC;
@@ -460,6 +463,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               openRow,
                               occludeRow,
                               aoMeanRow,
-                              aoSpreadRow};
+                              aoSpreadRow,
+                              reflectRow};
 
 }  // namespace stipple::cpu

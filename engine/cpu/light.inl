@@ -3,7 +3,7 @@
 /// The pixels of a row that are lit, closed up: of a forest's ground there may be few in each row.
 struct alignas(64) LitPixels {
     uint32_t at[kTile];
-    float x[kTile], depth[kTile], nx[kTile], ny[kTile], nz[kTile], leaf[kTile];
+    float x[kTile], y[kTile], depth[kTile], nx[kTile], ny[kTile], nz[kTile], leaf[kTile];
     float red[kTile], green[kTile], blue[kTile];
     uint32_t words[kTile];
 };
@@ -13,14 +13,15 @@ struct alignas(64) Sent {
     float r[kTile], g[kTile], b[kTile];
 };
 
-/// Where `mask` says so.
+/// Where `mask` says so. (offX, offY): the first pixel's centre, px from the principal point.
 [[gnu::always_inline]] inline size_t takeLit(const SurfaceRow& row, const uint32_t* __restrict mask, float offX,
-                                             uint32_t pixels, LitPixels& p) {
+                                             float offY, uint32_t pixels, LitPixels& p) {
     size_t n = 0;
     for (uint32_t i = 0; i < pixels; ++i) {
         if (mask[i] == 0) continue;
         p.at[n] = i;
-        p.x[n] = offX + float(int(i));
+        p.x[n] = row.placeX != nullptr ? row.placeX[i] : offX + float(int(i));
+        p.y[n] = row.placeY != nullptr ? row.placeY[i] : offY;
         p.depth[n] = row.depth[i];
         p.nx[n] = row.nx[i];
         p.ny[n] = row.ny[i];
@@ -34,11 +35,11 @@ struct alignas(64) Sent {
     return n;
 }
 
-/// The surfaces of the pixels; plain pointers, or loops over them do not become SIMD. vy: of the row, over the focal
-/// length.
+/// The surfaces of the pixels; plain pointers, or loops over them do not become SIMD.
 struct LitSurfaces {
-    LitSurfaces(const LitPixels& p, const Lens& of, float inverse, float y)
+    LitSurfaces(const LitPixels& p, const Lens& of, float inverse)
         : px(p.x),
+          py(p.y),
           nx(p.nx),
           ny(p.ny),
           nz(p.nz),
@@ -48,10 +49,9 @@ struct LitSurfaces {
           pb(p.blue),
           word(p.words),
           lens(of),
-          inverseFocal(inverse),
-          vy(y) {}
+          inverseFocal(inverse) {}
     [[gnu::always_inline]] Surface operator()(size_t i) const {
-        const vec3 e = rayDirection(pixelRay(lens, px[i] * inverseFocal, vy));
+        const vec3 e = rayDirection(pixelRay(lens, px[i] * inverseFocal, py[i] * inverseFocal));
         const float inverse = 1.0f / std::sqrt(e.x * e.x + e.y * e.y + 1.0f);
         const vec3 ray = vec3(e.x * inverse, e.y * inverse, inverse);
         Surface s;
@@ -65,10 +65,10 @@ struct LitSurfaces {
         s.dielectric = vec3(kDielectric, kDielectric, kDielectric);
         return s;
     }
-    const float *px, *nx, *ny, *nz, *leaf, *pr, *pg, *pb;
+    const float *px, *py, *nx, *ny, *nz, *leaf, *pr, *pg, *pb;
     const uint32_t* word;
     Lens lens;
-    float inverseFocal, vy;
+    float inverseFocal;
 };
 
 /// Of the sky or the environment, and of the sun where there are no other lights.
@@ -112,14 +112,14 @@ template <bool isMasked>
                                             const uint32_t* __restrict mask, const LitSurfaces surfaceAt, size_t n,
                                             float* __restrict r, float* __restrict g, float* __restrict b) {
     const LightSource light = of;
-    const float* const px = surfaceAt.px;
+    const float *const px = surfaceAt.px, *const py = surfaceAt.py;
     const Lens lens = surfaceAt.lens;
-    const float inverseFocal = surfaceAt.inverseFocal, vy = surfaceAt.vy;
+    const float inverseFocal = surfaceAt.inverseFocal;
     const bool isFar = light.kind == kLightDirectional;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const float z = depth[i];
-        const vec3 point = alongRay(pixelRay(lens, px[i] * inverseFocal, vy), z);
+        const vec3 point = alongRay(pixelRay(lens, px[i] * inverseFocal, py[i] * inverseFocal), z);
         vec3 l = vec3(light.position.x - (isFar ? 0.0f : point.x), light.position.y - (isFar ? 0.0f : point.y),
                       light.position.z - (isFar ? 0.0f : point.z));
         const float inverse = 1.0f / std::sqrt(max(l.x * l.x + l.y * l.y + l.z * l.z, 1.0e-12f));
@@ -143,8 +143,8 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
     const float inverseFocal = 1.0f / f.focal;
     LitPixels p;
     Sent sent;
-    const size_t n = takeLit(row, mask, offX, pixels, p);
-    const LitSurfaces surfaceAt(p, lensHere(f.focal), inverseFocal, offY * inverseFocal);
+    const size_t n = takeLit(row, mask, offX, offY, pixels, p);
+    const LitSurfaces surfaceAt(p, lensHere(f.focal), inverseFocal);
     addSurroundings(f, input, surfaceAt, n, sent.r, sent.g, sent.b);
     for (uint32_t k = 0; k < f.lightCount; ++k) {
         const LightSource& light = input.lights[k];
@@ -214,4 +214,11 @@ void lightRow(const FrameConstants& frame, const LightInput& light, uint32_t x0,
     }
     if (anyMask != 0)
         lightSurfaces(f, light, mask, float(int(x0)) + 0.5f - f.centre.x, float(int(y)) + 0.5f - f.centre.y, n, row);
+    if (row.mirroredRed == nullptr) return;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        row.red[i] += row.mirroredRed[i];
+        row.green[i] += row.mirroredGreen[i];
+        row.blue[i] += row.mirroredBlue[i];
+    }
 }

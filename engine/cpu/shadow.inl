@@ -16,8 +16,8 @@ constexpr float kOffMap = 0.0f, kOnMap = 1.0f;
 [[gnu::always_inline]] inline size_t takeSeen(const FrameConstants& f, const SurfaceRow& row, uint32_t x0, uint32_t y,
                                               uint32_t n, ShadowPixels& p, float& nearest) {
     const Lens lens = lensHere(f.focal);
-    const float inverse = 1.0f / f.focal, vy = (float(int(y)) + 0.5f - f.centre.y) * inverse;
-    const float offX = float(int(x0)) + 0.5f - f.centre.x;
+    const float inverse = 1.0f / f.focal, offX = float(int(x0)) + 0.5f - f.centre.x,
+                offY = float(int(y)) + 0.5f - f.centre.y;
     size_t count = 0;
     for (uint32_t i = 0; i < n; ++i) {
         if (!(row.depth[i] > 0.0f)) continue;
@@ -30,7 +30,11 @@ constexpr float kOffMap = 0.0f, kOnMap = 1.0f;
     }
     nearest = 3.0e38f;
     for (size_t k = 0; k < count; ++k) {
-        const vec3 c = alongRay(pixelRay(lens, (offX + float(int(p.at[k]))) * inverse, vy), p.z[k]);
+        p.x[k] = row.placeX != nullptr ? row.placeX[p.at[k]] : offX + float(int(p.at[k]));
+        p.y[k] = row.placeY != nullptr ? row.placeY[p.at[k]] : offY;
+    }
+    for (size_t k = 0; k < count; ++k) {
+        const vec3 c = alongRay(pixelRay(lens, p.x[k] * inverse, p.y[k] * inverse), p.z[k]);
         p.x[k] = c.x;
         p.y[k] = c.y;
         p.reach2[k] = c.x * c.x + c.y * c.y + c.z * c.z;

@@ -20,7 +20,7 @@ namespace stipple::gpu {
 constexpr bool isUniform(uint32_t binding) {
     return binding == shared::kEdlBinding || binding == shared::kFogBinding || binding == shared::kToneBinding ||
            binding == shared::kOcclusionBinding || binding == shared::kShadowBinding ||
-           binding == shared::kBackgroundBinding;
+           binding == shared::kBackgroundBinding || binding == shared::kReflectionBinding;
 }
 constexpr VkDescriptorType descriptorType(uint32_t binding) {
     return isUniform(binding) ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;

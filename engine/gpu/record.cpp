@@ -6,6 +6,7 @@
 #include "engine/base/check.h"
 #include "engine/gpu/passes/passes.h"
 #include "shaders/shared/background.h"
+#include "shaders/shared/reflection.h"
 
 namespace stipple::gpu {
 
@@ -73,6 +74,7 @@ shared::Step Recording::stepAt(size_t level) const {
     step.exactPoints = render::reconstructionOf(request_.mode).fillsSplats && !isSmoothing_ ? 1 : 0;
     step.hasFiltered = has(render::Pass::ewa) ? 1 : 0;
     step.hasBackground = draws().tableAt<shared::BackgroundConstants>(shared::kBackgroundBinding) != nullptr ? 1 : 0;
+    step.hasMirrored = draws().tableAt<shared::ReflectionConstants>(shared::kReflectionBinding) != nullptr ? 1 : 0;
     step.onlySmooth = isSmoothing_ ? 1 : 0;
     step.hasSmooth = hasSmooth && levels.size() > 1 ? 1 : 0;
     step.smoothTexels = levels[0].offset;

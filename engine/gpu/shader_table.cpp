@@ -12,6 +12,7 @@
 #include "shaders/shared/material.h"
 #include "shaders/shared/occlusion.h"
 #include "shaders/shared/optics.h"
+#include "shaders/shared/reflection.h"
 #include "shaders/shared/shadow_table.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
@@ -79,6 +80,7 @@ static_assert(isLaidOut(shared::kOpenBinding, sizeof(float)));
 static_assert(isLaidOut(shared::kShadowBinding, sizeof(shared::ShadowTable)));
 static_assert(isLaidOut(shared::kBackgroundBinding, sizeof(shared::BackgroundConstants)));
 static_assert(isLaidOut(shared::kBackdropBinding, sizeof(uint32_t)));
+static_assert(isLaidOut(shared::kReflectionBinding, sizeof(shared::ReflectionConstants)));
 #endif
 
 }  // namespace

@@ -441,12 +441,8 @@ class ReferenceBackend final : public render::DrawsAtOnce {
             colour = !o.valid ? dvec3(1, 0.3, 0.02) : o.depth != s.depth ? dvec3(0.02, 0.1, 0.9) : dvec3(0.2);
         } else if (f.debugView == shared::kDebugNormals) {
             colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
-        } else if (f.debugView == shared::kDebugNone &&
-                   ((s.isTriangle && !s.isLitAsPoint) ||
-                    (isLit(f) && (s.hasMaterial() || !draws.lights.empty() || draws.environment)))) {
-            colour = shadeTriangle(s, n, viewRay(v, p).at(depth), draws);
-        } else if (isLit(f) && f.debugView == shared::kDebugNone) {
-            colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)), s.occlusion);
+        } else if (f.debugView == shared::kDebugNone) {
+            colour = sentBy(s, n, viewRay(v, p).at(depth), draws, isLit(f)) + s.mirrored;
         }
         return {colour, n, depth};
     }

@@ -36,6 +36,7 @@ struct Sample {
     double materialShare = 0;
     bool hasMaterial() const { return materialShare > 0.5; }
     glm::dvec3 emissive{0};
+    glm::dvec3 mirrored{0};  ///< what light adds of the picture's mirror image
     /// No surface, and lets light through: hardly any thickness. `pixels`: of a world unit at its depth.
     bool isLeaf(double pixels) const { return thickness * pixels < 0.125 * radius; }
     /// So do narrow ribbons, which are merged as a surface is: of what is not round `axis.x` is 1 where all parts are.

@@ -251,26 +251,44 @@ dvec3 irradianceOf(const render::Environment& environment, const dvec3& n) {
     return irradianceAround(environment.table, n);
 }
 
+dvec3 sentBy(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws, bool areLit) {
+    const bool isSurface = s.hasMaterial() || !draws.lights.empty() || draws.environment;
+    if ((s.isTriangle && !s.isLitAsPoint) || (areLit && isSurface)) return shadeTriangle(s, n, point, draws);
+    if (!areLit) return s.colour;
+    return s.colour * lightOn(n, draws.frame, s.letsLightThrough(pixelsAt(draws.view, s.depth)), s.occlusion);
+}
+
+dvec3 surroundingsOf(const dvec3& mirror, const dvec3& n, double roughness, const render::DrawList& draws) {
+    const shared::FrameConstants& f = draws.frame;
+    if (!draws.environment) return dvec3(0.25 + 0.15 * glm::dot(glm::mix(mirror, n, roughness), dvec3(f.skyDirection)));
+    const glm::dmat3 toMap =
+        glm::transpose(glm::dmat3(dvec3(f.environmentX), dvec3(f.environmentY), dvec3(f.environmentZ)));
+    return mirrored(*draws.environment, toMap * mirror, roughness);
+}
+
+dvec3 mirrorShareOf(const Sample& s, double facing) {
+    // The environment's share of a microfacet mirror (Karis 2013, fit by Lazarov).
+    const dvec4 r = s.roughness * dvec4(-1, -0.0275, -0.572, 0.022) + dvec4(1, 0.0425, 1.04, -0.04);
+    const double a004 = std::min(r.x * r.x, std::exp2(-9.28 * facing)) * r.x + r.y;
+    const dvec2 ab = dvec2(-1.04, 1.04) * a004 + dvec2(r.z, r.w);
+    return glm::mix(dvec3(0.04), s.colour, s.metallic) * ab.x + ab.y;
+}
+
 dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws,
                     const LightPast& past) {
     const shared::FrameConstants& f = draws.frame;
     if (s.isTriangle && !s.isLitAsPoint && (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0)) return s.colour;
     const dvec3 v = -sightOf(draws.view, point), up(f.skyDirection);
     const double nv = std::max(glm::dot(n, v), 1e-3);
-    const dvec3 mirror = 2 * nv * n - v;
-    // The environment's share of a microfacet mirror (Karis 2013, fit by Lazarov).
-    const dvec4 r = s.roughness * dvec4(-1, -0.0275, -0.572, 0.022) + dvec4(1, 0.0425, 1.04, -0.04);
-    const double a004 = std::min(r.x * r.x, std::exp2(-9.28 * nv)) * r.x + r.y;
-    const dvec2 ab = dvec2(-1.04, 1.04) * a004 + dvec2(r.z, r.w);
-    const dvec3 f0 = glm::mix(dvec3(0.04), s.colour, s.metallic);
-    dvec3 blurred(0.25 + 0.15 * glm::dot(glm::mix(mirror, n, s.roughness), up)), around(0.25 + 0.15 * glm::dot(n, up));
+    const dvec3 blurred = surroundingsOf(2 * nv * n - v, n, s.roughness, draws);
+    dvec3 around(0.25 + 0.15 * glm::dot(n, up));
     if (draws.environment) {
         const glm::dmat3 toMap =
             glm::transpose(glm::dmat3(dvec3(f.environmentX), dvec3(f.environmentY), dvec3(f.environmentZ)));
         around = irradianceAround(draws.environment->table, toMap * n);
-        blurred = mirrored(*draws.environment, toMap * mirror, s.roughness);
     }
-    dvec3 sum = double(f.ambient) * s.occlusion * (s.colour * (1 - s.metallic) * around + (f0 * ab.x + ab.y) * blurred);
+    const dvec3 sky = s.colour * (1 - s.metallic) * around + mirrorShareOf(s, nv) * blurred;
+    dvec3 sum = double(f.ambient) * s.occlusion * sky;
     return sum + lightsOn(s, n, point, dvec3(0.04), draws, past) + s.emissive;
 }
 

@@ -63,6 +63,17 @@ glm::dvec3 irradianceOf(const render::Environment& environment, const glm::dvec3
 glm::dvec3 lightsOn(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const glm::dvec3& dielectric,
                     const render::DrawList& draws, const LightPast& past = {});
 
+/// What a mirror of that roughness sees where nothing is in its way, at ambient light 1. `n`: of its surface.
+glm::dvec3 surroundingsOf(const glm::dvec3& mirror, const glm::dvec3& n, double roughness,
+                          const render::DrawList& draws);
+/// What of that a sample sends on; `facing`: cosine between its normal and the eye.
+glm::dvec3 mirrorShareOf(const Sample& s, double facing);
+
+/// What a sample sends to the eye under the frame's light. `n`: towards the eye; `point`: camera space; `areLit`: are
+/// points?
+glm::dvec3 sentBy(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const render::DrawList& draws,
+                  bool areLit);
+
 /// Light from a triangle's pixel to the eye. `n`: towards the eye; `point`: camera space.
 glm::dvec3 shadeTriangle(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const render::DrawList& draws,
                          const LightPast& past = {});

@@ -54,6 +54,7 @@ DrawSettings inUnits(DrawSettings settings, double units) {
         for (int c = 0; c < 3; ++c) light.colour[c] = toFloat(light.colour[c] * units * units);
     }
     settings.parameters.occlusion.radius *= units;
+    settings.parameters.reflection.distance *= units;
     settings.parameters.facts.extent *= units;
     FogSettings& fog = settings.parameters.fog;
     fog.density /= units;

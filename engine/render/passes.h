@@ -23,6 +23,7 @@ enum class Plane : uint8_t {
     smooth,      ///< level 0 of discs so wide that they would show as facets, and the levels above
     surface,     ///< what is seen at each pixel, whoever filled it
     shadows,     ///< what of each light that casts shadows comes to a pixel
+    mirrored,    ///< what light adds of the picture's mirror images in smooth surfaces
     behind,      ///< what is seen of a picture behind everything
     image
 };

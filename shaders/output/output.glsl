@@ -21,6 +21,15 @@ layout(set = 0, binding = kToneBinding, scalar) uniform ToneBlock { ToneConstant
 #endif
 layout(local_size_x = 64) in;
 
+#ifdef LIT
+// What light adds of the picture's mirror images (../reflection), two halves a word.
+vec3 mirroredAt(uint at) {
+    if (stepInfo.hasMirrored == 0u) return vec3(0.0);
+    const uint plane = frame.width * frame.height;
+    return vec3(unpackHalf2x16(texels[at + 3u * plane]), unpackHalf2x16(texels[at + 4u * plane]).x);
+}
+#endif
+
 // What is behind everything at a pixel (../background).
 vec3 behindAll(uint at) {
     if (stepInfo.hasBackground == 0u) return frame.background;
@@ -71,7 +80,7 @@ void main() {
         n = octDecode(s.normal);
         colour = vec3(unpackRed(s.albedo), unpackGreen(s.albedo), unpackBlue(s.albedo));
 #ifdef LIT
-        colour = litColour(s, colour, n, pixel);
+        colour = litColour(s, colour, n, pixel) + mirroredAt(at);
 #endif
 #ifdef REFRACTED
         colour = glassColour(s, colour, n, pixel);

@@ -42,7 +42,8 @@ const uint kOpenBinding = 34u;
 const uint kShadowBinding = 35u;
 const uint kBackgroundBinding = 36u;
 const uint kBackdropBinding = 37u;
-const uint kBindings = 38u;
+const uint kReflectionBinding = 38u;
+const uint kBindings = 39u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more
@@ -86,6 +87,7 @@ struct Step {
     uint hasFiltered;    // ... of what discs were blended to
     uint onlySmooth;     // of the nodes of points, those that are kNodeSmooth
     uint hasBackground;  // what is not covered shows what pass background has left, else frame.background
+    uint hasMirrored;    // light adds what pass reflection has left
     uint hasSmooth;      // pixels of wide discs take colours and normals from a pyramid of their own ...
     uint smoothTexels;   // ... whose level 0 has its planes here
     uint count;          // of clusters or blocks

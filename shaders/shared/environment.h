@@ -100,8 +100,7 @@ SHARED_FN vec3 environmentMirror(SHARED_TABLE vec3 d, float roughness, uint shar
 // The environment's share of a surface's light; toWorld: rows of the rotation from camera space to the map's.
 SHARED_FN vec3 reflectEnvironment(SHARED_TABLE Surface s, vec3 toWorldX, vec3 toWorldY, vec3 toWorldZ, uint sharp) {
     const float nv = max(dot(s.normal, s.toEye), 1.0e-3f);
-    const vec3 r = vec3(2.0f * nv * s.normal.x - s.toEye.x, 2.0f * nv * s.normal.y - s.toEye.y,
-                        2.0f * nv * s.normal.z - s.toEye.z);
+    const vec3 r = mirrorDirection(s.normal, s.toEye, nv);
     const vec3 around = environmentDiffuse(
         SHARED_TABLE_USE vec3(dot(toWorldX, s.normal), dot(toWorldY, s.normal), dot(toWorldZ, s.normal)));
     const vec3 mirror = environmentMirror(SHARED_TABLE_USE vec3(dot(toWorldX, r), dot(toWorldY, r), dot(toWorldZ, r)),

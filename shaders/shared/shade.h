@@ -85,26 +85,40 @@ SHARED_FN float exp2Below(float x) {
     return eight * eight;
 }
 
-// What light from all around sends back: `around` falls on the surface, `mirror` is what a mirror of its roughness sees
-// (Karis 2013, with Lazarov's fit).
-SHARED_FN vec3 reflectAround(Surface s, float nv, vec3 around, vec3 mirror) {
+// Where a mirror looks: the eye's direction turned about the normal; `nv`: the cosine between both, above 0.
+SHARED_FN vec3 mirrorDirection(vec3 n, vec3 toEye, float nv) {
+    return vec3(2.0f * nv * n.x - toEye.x, 2.0f * nv * n.y - toEye.y, 2.0f * nv * n.z - toEye.z);
+}
+
+// What a surface sends back of the light that a mirror of its roughness sees (Karis 2013, with Lazarov's fit).
+SHARED_FN vec3 mirrorShare(Surface s, float nv) {
     const float rx = 1.0f - s.roughness;
     const float ry = 0.0425f - 0.0275f * s.roughness;
     const float a004 = min(rx * rx, exp2Below(-9.28f * nv)) * rx + ry;
     const float scale = -1.04f * a004 + 1.04f - 0.572f * s.roughness;
     const float bias = 1.04f * a004 - 0.04f + 0.022f * s.roughness;
-    const float diffuse = 1.0f - s.metallic;
     const vec3 f0 = straightOn(s);
-    return vec3(s.occlusion * (s.colour.x * diffuse * around.x + (f0.x * scale + bias) * mirror.x),
-                s.occlusion * (s.colour.y * diffuse * around.y + (f0.y * scale + bias) * mirror.y),
-                s.occlusion * (s.colour.z * diffuse * around.z + (f0.z * scale + bias) * mirror.z));
+    return vec3(f0.x * scale + bias, f0.y * scale + bias, f0.z * scale + bias);
+}
+
+// What light from all around sends back: `around` falls on the surface, `mirror` is what a mirror of its roughness
+// sees.
+SHARED_FN vec3 reflectAround(Surface s, float nv, vec3 around, vec3 mirror) {
+    const float diffuse = 1.0f - s.metallic;
+    const vec3 share = mirrorShare(s, nv);
+    return vec3(s.occlusion * (s.colour.x * diffuse * around.x + share.x * mirror.x),
+                s.occlusion * (s.colour.y * diffuse * around.y + share.y * mirror.y),
+                s.occlusion * (s.colour.z * diffuse * around.z + share.z * mirror.z));
+}
+
+// What a mirror of the surface's roughness, which looks along r, sees of the sky.
+SHARED_FN float skyMirror(Surface s, vec3 r, vec3 up) {
+    return 0.25f + 0.15f * (1.0f - s.roughness) * dot(r, up) + 0.15f * s.roughness * dot(s.normal, up);
 }
 
 SHARED_FN vec3 reflectSky(Surface s, vec3 up) {
     const float nv = max(dot(s.normal, s.toEye), 1.0e-3f);
-    const vec3 r = vec3(2.0f * nv * s.normal.x - s.toEye.x, 2.0f * nv * s.normal.y - s.toEye.y,
-                        2.0f * nv * s.normal.z - s.toEye.z);
-    const float mirror = 0.25f + 0.15f * (1.0f - s.roughness) * dot(r, up) + 0.15f * s.roughness * dot(s.normal, up);
+    const float mirror = skyMirror(s, mirrorDirection(s.normal, s.toEye, nv), up);
     const float around = skyLight(s.normal, up);
     return reflectAround(s, nv, vec3(around, around, around), vec3(mirror, mirror, mirror));
 }

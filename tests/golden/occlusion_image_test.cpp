@@ -6,11 +6,10 @@
 #include <glm/gtc/constants.hpp>
 
 #include "engine/reference/reference.h"
-#include "engine/scene/triangles.h"
-#include "lod/builder/mesh/mesh_build.h"
 #include "tests/support/backends_here.h"
 #include "tests/support/curves.h"
 #include "tests/support/mixed_store.h"
+#include "tests/support/shapes.h"
 
 namespace stipple {
 namespace {
@@ -18,6 +17,8 @@ namespace {
 using glm::dvec3;
 using render::FrameSettings;
 using render::Image;
+using test::lookingAt;
+using test::Shapes;
 
 /// Light from all around alone: a light of the scene's own that gives none.
 FrameSettings inAmbientLight(double radius, bool isFull, render::Mode mode = render::Mode::surface) {
@@ -29,61 +30,6 @@ FrameSettings inAmbientLight(double radius, bool isFull, render::Mode mode = ren
     if (radius > 0) s.draw.effects = {"occlusion"};
     return s;
 }
-
-/// Triangles of a diffuse white.
-struct Shapes {
-    scene::Primitive mesh;
-    void add(const std::vector<dvec3>& places, const std::vector<dvec3>& normals, uint32_t columns) {
-        const auto first = static_cast<uint32_t>(mesh.position.size());
-        for (size_t i = 0; i < places.size(); ++i) {
-            mesh.position.emplace_back(places[i]);
-            mesh.normal.emplace_back(normals[i]);
-        }
-        const auto rows = static_cast<uint32_t>(places.size()) / columns;
-        for (uint32_t y = 0; y + 1 < rows; ++y)
-            for (uint32_t x = 0; x + 1 < columns; ++x) {
-                const uint32_t a = first + y * columns + x, b = a + 1, c = a + columns, d = c + 1;
-                for (const uint32_t k : {a, b, d, a, d, c}) mesh.indices.push_back(k);
-            }
-    }
-    /// A square about `middle`, from its edges' halves.
-    void square(const dvec3& middle, const dvec3& u, const dvec3& v) {
-        const dvec3 n = glm::normalize(glm::cross(u, v));
-        add({middle - u - v, middle + u - v, middle - u + v, middle + u + v}, {n, n, n, n}, 2);
-    }
-    void ball(const dvec3& middle, double radius) {
-        constexpr uint32_t kAround = 96, kDown = 48;
-        std::vector<dvec3> places, normals;
-        for (uint32_t j = 0; j <= kDown; ++j)
-            for (uint32_t i = 0; i <= kAround; ++i) {
-                const double a = 2 * glm::pi<double>() * i / kAround, e = glm::pi<double>() * j / kDown;
-                normals.emplace_back(std::sin(e) * std::cos(a), std::sin(e) * std::sin(a), -std::cos(e));
-                places.push_back(middle + radius * normals.back());
-            }
-        add(places, normals, kAround + 1);
-    }
-    std::shared_ptr<const lod::Store> built(const std::string& path, Executor& executor) {
-        scene::Scene s;
-        mesh.material = 0;
-        s.materials.resize(1);
-        s.materials[0].roughness = 1;
-        s.materials[0].metallic = 0;
-        s.materials[0].isDoubleSided = true;
-        s.meshes.resize(1);
-        s.meshes[0].primitives = {mesh};
-        s.nodes.resize(1);
-        s.nodes[0].mesh = 0;
-        lod::MeshBuildSettings build;
-        build.description.materials = scene::surfaceMaterials(s);
-        Progress silent(false);
-        const auto done =
-            lod::buildMeshStore(scene::triangleSource(s, scene::placements(s)), path, build, executor, silent);
-        EXPECT_TRUE(done) << done.error().line();
-        auto store = lod::openStore(path);
-        EXPECT_TRUE(store) << store.error().line();
-        return store ? std::make_shared<const lod::Store>(std::move(*store)) : nullptr;
-    }
-};
 
 class AmbientOcclusion : public test::BackendsHere {
   protected:
@@ -111,19 +57,6 @@ class AmbientOcclusion : public test::BackendsHere {
             count += isUnlike ? 1 : 0;
         }
         return double(count) / double(a.rgba.size());
-    }
-    static lod::View lookingAt(const dvec3& target, const dvec3& from, bool isOrthographic = false) {
-        lod::View v;
-        v.eye = from;
-        v.forward = glm::normalize(target - from);
-        v.right = glm::normalize(glm::cross(v.forward, dvec3(0, 0, 1)));
-        v.down = glm::cross(v.forward, v.right);
-        v.width = 240;
-        v.height = 180;
-        v.focalPixels = 220;
-        v.isOrthographic = isOrthographic;
-        if (isOrthographic) v.focalPixels /= glm::length(target - from);
-        return v;
     }
     static std::vector<lod::View> bothViews(const dvec3& target, const dvec3& from) {
         return {lookingAt(target, from), lookingAt(target, from, true)};

@@ -85,6 +85,7 @@ void addEffect(const std::string& name, Executor& executor, render::DrawSettings
         s.lights = {lampThatCasts()};
         s.parameters.shadow.texels = 128;
     }
+    if (name == "reflection") s.unlitTriangles = false;  // the house has panes
     if (name == "fog") s.parameters.fog.density = 0.1;
     if (name == "tone") s.parameters.tone = {1.5, 1};
 }
@@ -112,6 +113,10 @@ bool addUselessly(const std::string& name, Executor& executor, render::DrawSetti
     if (name == "edl") {
         s.lit = true;
         s.unlitTriangles = false;
+        return true;
+    }
+    if (name == "reflection") {  // nothing that is lit is smooth
+        s.lit = true;
         return true;
     }
     if (name == "fog") s.parameters.fog.density = 1e-6;

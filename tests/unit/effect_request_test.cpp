@@ -52,6 +52,11 @@ TEST(EffectRequests, AutoCallsForWhatTheSceneNeeds) {
     SceneFacts bare;
     bare.hasPoints = bare.hasPointsWithoutNormals = true;
     EXPECT_EQ(namesIn(ask({"auto", {}}, bare).settings), Names{"edl"});
+    SceneFacts smooth;
+    smooth.hasMirrors = true;
+    const Asked mirrors = ask({"auto", {}}, smooth);
+    EXPECT_EQ(namesIn(mirrors.settings), Names{"reflection"});
+    EXPECT_EQ(mirrors.settings.effects.front().by, "smooth materials");
     EXPECT_TRUE(namesIn(ask({"none", {}}, unlitScan()).settings).empty());
     EXPECT_TRUE(namesIn(ask({"auto,-edl", {}}, unlitScan()).settings).empty());
     EXPECT_EQ(namesIn(ask({"fog", {}}, unlitScan()).settings), Names{"fog"});

@@ -141,12 +141,14 @@ TEST_F(Effects, ThatAreAskedForByNameAreThoseOfTheTable) {
 TEST(LengthUnits, ScaleWhatEffectsAreAskedForOnce) {
     DrawSettings of;
     of.parameters.occlusion.radius = 2;
+    of.parameters.reflection.distance = 3;
     of.parameters.facts.extent = 5;
     of.parameters.fog.density = 7;
     of.parameters.fog.height = 11;
     of.parameters.fog.base = 13;
     const EffectParameters in = inUnits(of, 4).parameters;
     EXPECT_EQ(in.occlusion.radius, 8);
+    EXPECT_EQ(in.reflection.distance, 12);
     EXPECT_EQ(in.facts.extent, 20);
     EXPECT_EQ(in.fog.density, 1.75);
     EXPECT_EQ(in.fog.height, 44);

@@ -51,7 +51,8 @@ TEST(Passes, ReadNothingThatNobodyWrote) {
                         if (plane == Plane::smooth && !has(passes, Pass::smooth)) continue;
                         if (plane == Plane::shadows && !has(passes, Pass::shadow)) continue;  // all light comes there
                         if (plane == Plane::filtered && !has(passes, Pass::ewa)) continue;    // so are blended pixels
-                        if (plane == Plane::behind && !has(passes, Pass::background)) continue;  // it is one colour
+                        if (plane == Plane::mirrored && !has(passes, Pass::reflection)) continue;  // nothing is added
+                        if (plane == Plane::behind && !has(passes, Pass::background)) continue;    // it is one colour
                         if (info.reads.has(plane))
                             EXPECT_TRUE(written.has(plane)) << r.name << ": " << info.name << " reads " << p;
                     }

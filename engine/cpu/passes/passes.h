@@ -61,6 +61,10 @@ bool joinsRows(render::Pass pass);
 /// is kept for the passes of `later`, unless it is the picture.
 void runRows(Frame& frame, std::span<const render::Pass> passes, std::span<const render::Pass> later);
 
+/// What lights surfaces, and what of that comes past shadow maps (no slots: nothing casts).
+LightInput lightInputOf(const Frame& frame);
+ShadowInput shadowInputOf(const Frame& frame);
+
 /// Does any of the passes read normals of the surface?
 bool wantsNormals(const Frame& frame, std::span<const render::Pass> passes);
 

@@ -61,6 +61,14 @@ bool takeRow(const RowPlace& at, const SurfacePlanes& planes, const SurfaceWants
     return true;
 }
 
+void takeMirrored(const RowPlace& at, SurfaceRow& row) {
+    const Frame::Mirrored& of = at.frame.mirrored;
+    const bool isAny = of.rows != nullptr && of.rows[at.frame.tileRow(at.x0, at.y)] != 0;
+    row.mirroredRed = isAny ? of.red + at.first : nullptr;
+    row.mirroredGreen = isAny ? of.green + at.first : nullptr;
+    row.mirroredBlue = isAny ? of.blue + at.first : nullptr;
+}
+
 /// A run of passes over rows.
 class RowProgram {
   public:
@@ -118,6 +126,7 @@ class RowProgram {
         surface.shadowSlots = 0;
         surface.hasBehind = false;
         if (!takeRow(at, planes, wantsOf(planes), surface)) return finishEmpty(at);
+        takeMirrored(at, surface);
         finish(at, planes, surface);
     }
 
@@ -409,6 +418,19 @@ bool wantsNormals(const Frame& frame, std::span<const render::Pass> passes) {
     return wants.normal;
 }
 
+LightInput lightInputOf(const Frame& frame) {
+    const render::DrawList& draws = *frame.draws;
+    return {draws.lights.data(), draws.environment ? draws.environment->table.data() : nullptr,
+            draws.shadowSlotOf.empty() ? nullptr : draws.shadowSlotOf.data()};
+}
+
+ShadowInput shadowInputOf(const Frame& frame) {
+    const Frame::Shadows& s = frame.shadows;
+    if (!frame.draws->isShadowed) return {};
+    return {s.maps.data(), s.depths.data(), s.through.data(), static_cast<uint32_t>(s.maps.size()),
+            frame.draws->shadowSlots};
+}
+
 /// Its rows are made by RowProgram::run.
 constinit const CpuPass surfacePass{};
 
@@ -424,11 +446,7 @@ constinit const CpuPass lightPass{
                 },
             .run =
                 [](const RowPlace& at, SurfaceRow& row) {
-                    const render::DrawList& draws = *at.frame.draws;
-                    const LightInput light{draws.lights.data(),
-                                           draws.environment ? draws.environment->table.data() : nullptr,
-                                           draws.shadowSlotOf.empty() ? nullptr : draws.shadowSlotOf.data()};
-                    at.frame.k.lightRow(at.frame.constants, light, at.x0, at.y, at.n, row);
+                    at.frame.k.lightRow(at.frame.constants, lightInputOf(at.frame), at.x0, at.y, at.n, row);
                 }}};
 
 constinit const CpuPass outputPass{

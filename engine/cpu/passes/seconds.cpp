@@ -14,6 +14,7 @@ bool takeSeconds(const RowPlace& at, const SurfaceRow& first, SurfaceRow& second
     second.hasTriangles = second.hasEmission = second.hasCoverage = false;
     second.hasMaterials = first.hasMaterials;
     second.shadowSlots = 0;
+    second.mirroredRed = second.mirroredGreen = second.mirroredBlue = nullptr;
     for (float* const plane : {second.depth, second.nx, second.ny, second.red, second.green, second.blue, second.leaf})
         std::fill_n(plane, at.n, 0.0F);
     std::fill_n(second.nz, at.n, -1.0F);

@@ -8,12 +8,6 @@
 namespace stipple::cpu {
 namespace {
 
-ShadowInput inputOf(const Frame& frame) {
-    const Frame::Shadows& s = frame.shadows;
-    return {s.maps.data(), s.depths.data(), s.through.data(), static_cast<uint32_t>(s.maps.size()),
-            frame.draws->shadowSlots};
-}
-
 /// Tables of the maps, room for the masks, and whether those still hold: before them stands what they are of.
 void begin(Frame& frame) {
     Frame::Shadows& s = frame.shadows;
@@ -47,13 +41,13 @@ void run(const RowPlace& at, SurfaceRow& row) {
         for (uint32_t s = 0; s < slots; ++s) std::copy_n(kept(s), at.n, row.shadow[s]);
         return;
     }
-    frame.k.shadowRow(frame.constants, inputOf(frame), at.x0, at.y, at.n, row);
+    frame.k.shadowRow(frame.constants, shadowInputOf(frame), at.x0, at.y, at.n, row);
     for (uint32_t s = 0; s < slots && frame.draws->shadowKey != 0; ++s) std::copy_n(row.shadow[s], at.n, kept(s));
 }
 
 /// These are not kept.
 void beside(const RowPlace& at, SurfaceRow& second) {
-    at.frame.k.shadowRow(at.frame.constants, inputOf(at.frame), at.x0, at.y, at.n, second);
+    at.frame.k.shadowRow(at.frame.constants, shadowInputOf(at.frame), at.x0, at.y, at.n, second);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ struct SceneFacts {
     bool hasUnlitPoints = false;     ///< drawn as they are: their own colours, no light on them
     bool hasUnlitTriangles = false;  ///< the same of triangles and patches
     bool hasPointsWithoutNormals = false;
+    bool hasMirrors = false;      ///< opaque materials that are smooth enough to mirror the screen
     bool hasTransparent = false;  ///< materials that what is behind shows through
     uint32_t lights = 0;          ///< of the scene's own, and a sun
     uint32_t lightsThatCast = 0;  ///< of these: what is lit could show their shadows

@@ -48,6 +48,11 @@ struct ShadowSettings {
     double texels = 1024;
 };
 
+/// Reflections of the screen. `distance`: world units; 0: by the scene. `steps`: of the longest rays.
+struct ReflectionSettings {
+    double distance = 0, steps = 48;
+};
+
 /// Of all effects.
 struct EffectParameters {
     SceneFacts facts;  ///< of the scene that is drawn, where somebody said
@@ -56,6 +61,7 @@ struct EffectParameters {
     ToneSettings tone;
     OcclusionSettings occlusion;
     ShadowSettings shadow;
+    ReflectionSettings reflection;
 };
 
 }  // namespace stipple::render
