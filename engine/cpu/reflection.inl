@@ -143,8 +143,10 @@ struct alignas(64) MirrorLanes {
         const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], m.high[i]), back = m.high[i] - m.onePixel[i];
         const float zBack = mirrorDepth(lens, m.linear[i], m.dLinear[i], back);
         const int column = mirrorPixel(x, width), line = mirrorPixel(y, height), at = line * pitch + column;
+        const float on = m.onePixel[i];
+        const int next = mirrorPixel(y + on * m.dy[i], height) * pitch + mirrorPixel(x + on * m.dx[i], width);
         const vec3 toEye = towardsEye(lens, float(column) + 0.5f - centreX, float(line) + 0.5f - centreY);
-        m.off[i] = mirrorOff(lens, z, zBack, depths[at], std::abs(dot(octDecode(normals[at]), toEye)));
+        m.off[i] = mirrorOff(lens, z, zBack, depths[at], std::abs(dot(octDecode(normals[at]), toEye)), depths[next]);
         passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (m.off[i] < kMirrorFarOff ? 0.0f : 1.0f);
     }
     float any = 0.0f;

@@ -54,8 +54,10 @@ float offAt(MirrorRay m, float share) {
     const int column = mirrorPixel(m.x + share * m.dx, size.x), line = mirrorPixel(m.y + share * m.dy, size.y);
     const SurfaceWords s = surfaceBuffer[entryAt(column, line)];
     const vec3 toEye = -normalize(rayDirection(pixelRayHere(uvec2(column, line))));
+    const float on = share + m.onePixel;
     return mirrorOff(lens, mirrorDepth(lens, m.linear, m.dLinear, share),
-                     mirrorDepth(lens, m.linear, m.dLinear, share - m.onePixel), s.depth, abs(dot(octDecode(s.normal), toEye)));
+                     mirrorDepth(lens, m.linear, m.dLinear, share - m.onePixel), s.depth, abs(dot(octDecode(s.normal), toEye)),
+                     depthAt(m.x + on * m.dx, m.y + on * m.dy));
 }
 
 vec3 mirrored(uvec2 pixel) {

@@ -2,9 +2,9 @@
 //
 // The mirror ray of a pixel is followed across the picture in even steps, its depth by what is linear there (lens.h),
 // until it is behind what a pixel shows and was in front of the picture a step before; halvings of that step find the
-// place. Met is what the ray is behind by no more than what its depth and that of the surface change in a pixel; where
-// it is farther behind (twice that) it passes, and goes on. (Of grazing ground one pixel is far behind the next, of
-// what faces the eye it is not: how long a step is would not tell.)
+// place. Met is what the ray is no farther from than depths change there in a pixel; where it is farther behind (twice
+// that) it passes, and goes on. (Of grazing ground one pixel is far behind the next, of what faces the eye it is not:
+// how long a step is would not tell.)
 //
 //        eye ------> o surface          from o on: in front, in front, behind: between those two it is met
 //                     \_ . _ . _ x
@@ -99,13 +99,16 @@ SHARED_FN float mirrorDepth(Lens lens, float linear, float dLinear, float share)
 SHARED_FN int mirrorPixel(float at, float size) { return int(min(max(0.0f, at), size - 1.0f)); }
 // How far behind what a pixel shows a ray is; below 0 where it is not.
 SHARED_FN float mirrorBehind(float z, float depth) { return depth > 0.0f ? z - depth : -1.0f; }
-// How far a ray is behind what a pixel shows, in shares of what it is at most where it meets that: what the depth of
-// the ray (`z`; `zBefore`: one pixel before) and that of the surface change in a pixel. `depth`, `facing`: of the
-// surface; its normal's cosine to the eye.
-SHARED_FN float mirrorOff(Lens lens, float z, float zBefore, float depth, float facing) {
-    const float slope = sqrt(max(1.0f - facing * facing, 0.0f)) / max(facing, kMirrorGrazing);
+// How far a ray is from the surface that it went behind, in shares of what it may be where it meets that. `z`: of the
+// ray (`zBefore`: one pixel before); `depth`, `facing`: of the pixel where it is behind, its normal's cosine to the
+// eye; `next`: the depth of the picture one pixel on. From a pixel to the next depths go as they go from this one to
+// the one before it, but no steeper than the normal says: of ground that is exact, of a rim, which lets rays behind,
+// much less than its normal has it.
+SHARED_FN float mirrorOff(Lens lens, float z, float zBefore, float depth, float facing, float next) {
     const float pixel = lensDepth(lens, depth) / lens.focal;
-    return abs(z - depth) / (abs(z - zBefore) + (1.0f + slope) * pixel);
+    const float steepest = sqrt(max(1.0f - facing * facing, 0.0f)) / max(facing, kMirrorGrazing) * pixel;
+    const float half = 0.5f * min(max(depth - next, -steepest), steepest);
+    return abs(z - depth - half) / (abs(z - zBefore) + pixel + abs(half));
 }
 const float kMirrorFarOff = 2.0f;  // from there on it passes
 

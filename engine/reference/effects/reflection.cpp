@@ -54,7 +54,7 @@ class MirrorImages {
 
   private:
     struct Met {
-        dvec2 at{0};
+        dvec2 at{0}, pixel{0};
         double depth = 0, off = 0;  ///< off: offWall
     };
     struct Ray {
@@ -98,14 +98,19 @@ class MirrorImages {
         r.pixels = std::max({std::abs(r.to.x - r.from.x), std::abs(r.to.y - r.from.y), 1.0});
         return r;
     }
-    /// How far behind what a pixel shows the ray is, of what the depths of both change in a pixel.
-    double offWall(const Ray& r, double share, int x, int y) const {
-        const dvec2 middle(x + 0.5, y + 0.5);
-        const double depth = depthOf(x, y), z = std::max(depthAlong(r, share), depth);
-        const double facing = std::abs(
-            glm::dot(normalAt(*level_.at(x, y), middle, view_), sightOf(view_, viewRay(view_, middle).at(depth))));
-        const double slope = std::sqrt(std::max(1 - facing * facing, 0.0)) / std::max(facing, 1.0 / 16);
-        return (z - depth) / (std::abs(z - depthAlong(r, share - 1 / r.pixels)) + (1 + slope) / pixelsAt(view_, depth));
+    /// How far the ray is from the surface that it went behind in pixel `low`, of what it may be: on the way into that
+    /// pixel its depth is taken to go as it goes on, within what the normal allows.
+    double offWall(const Ray& r, double share, const dvec2& low) const {
+        const double depth = depthOf(int(low.x), int(low.y)), z = std::max(depthAlong(r, share), depth);
+        const dvec2 on =
+            glm::clamp(glm::floor(r.from + (share + 1 / r.pixels + 1e-9) * (r.to - r.from)), dvec2(0), size_ - 1.0);
+        const double facing = std::abs(glm::dot(normalAt(*level_.at(int(low.x), int(low.y)), low + 0.5, view_),
+                                                sightOf(view_, viewRay(view_, low + 0.5).at(depth))));
+        const double pixel = 1 / pixelsAt(view_, depth), tangent = std::sqrt(std::max(1 - facing * facing, 0.0));
+        const double steepest = tangent / std::max(facing, 1.0 / 16) * pixel;
+        const double into = std::clamp(depth - depthOf(int(on.x), int(on.y)), -steepest, steepest) / 2;
+        return std::abs(z - (depth + into)) /
+               (std::abs(z - depthAlong(r, share - 1 / r.pixels)) + pixel + std::abs(into));
     }
 
     /// Through one pixel after another, to the first wall that the ray goes behind.
@@ -128,8 +133,8 @@ class MirrorImages {
             const double entry = depthAlong(r, share), exit = depthAlong(r, end);
             if (wall > 0 && isInFront && std::max(entry, exit) > wall) {
                 const double at = entry > wall ? share : std::clamp(shareAtDepth(r, wall), share, end);
-                const double off = offWall(r, at, int(low.x), int(low.y));
-                if (off < 2) return Met{r.from + at * way, std::max(entry, wall), off};
+                const double off = offWall(r, at, low);
+                if (off < 2) return Met{r.from + at * way, low, std::max(entry, wall), off};
             }
             isInFront = !(wall > 0 && exit > wall);
             share = std::max(end, share + 1e-9);
@@ -138,7 +143,7 @@ class MirrorImages {
     }
 
     double shareOf(const Met& met, const dvec3& mirror, const dvec3& place) const {
-        const dvec2 low = glm::clamp(glm::floor(met.at), dvec2(0), size_ - 1.0);
+        const dvec2& low = met.pixel;
         const dvec3 n = normalAt(*level_.at(int(low.x), int(low.y)), low + 0.5, view_);
         const double border = std::min(size_.x, size_.y) / 16;
         const double inside = std::min({met.at.x, size_.x - met.at.x, met.at.y, size_.y - met.at.y});
