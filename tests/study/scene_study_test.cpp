@@ -231,6 +231,36 @@ TEST(SceneStudy, AuditsPatchesAgainstTheMeshThatTheyWereBuiltFrom) {
     EXPECT_FALSE(fs::exists(folder / "d"));
 }
 
+TEST(SceneStudy, AuditsShadowsOfALightThatCasts) {
+    const test::TempFolder folder;
+    writeTorus(folder / "torus.ply", 1);
+    ASSERT_EQ(test::runProgram(folder, "build torus.ply -o t.stipple --quiet").code, 0);
+    const auto auditOf = [&](const std::string& name, const std::string& light) {
+        test::spit(folder / (name + ".gltf"), fmt::format(R"({{"asset": {{"version": "2.0"}}, "scene": 0,
+            "scenes": [{{"nodes": [0, 1]}}], "extensionsUsed": ["STIPPLE_store", "KHR_lights_punctual"],
+            "nodes": [{{"extensions": {{"STIPPLE_store": {{"uri": "t.stipple"}}}}}},
+                      {{"rotation": [0, 0.5, 0, 0.8660254],
+                       "extensions": {{"KHR_lights_punctual": {{"light": 0}}}}}}],
+            "extensions": {{"KHR_lights_punctual": {{"lights": [{{"type": "{}", "intensity": 3}}]}}}}}})",
+                                                          light));
+        const test::Outcome r = test::runProgram(
+            folder, fmt::format("study {0}.gltf -o {0} --modes surface --errors 1 --sizes 240x180 --views 1 --blocks 1 "
+                                "--frames 1 --budgets none --quiet --json",
+                                name));
+        EXPECT_EQ(r.code, 0) << r.err;
+        return nlohmann::json::parse(r.out, nullptr, false);
+    };
+    const nlohmann::json sun = auditOf("sun", "directional"), point = auditOf("point", "point");
+    EXPECT_GT(sun["audit"]["shadow_pixels"], 10'000);
+    EXPECT_EQ(sun["audit"]["shadow_beyond"], 0);
+    const nlohmann::json& errors = sun["configurations"][0]["errors"];
+    EXPECT_GT(errors["shadow_wrong"], 0) << "borders are not exact, but within what is stated";
+    EXPECT_GT(errors["shadow_stated_px"], 0);
+    EXPECT_NE(test::slurp(folder / "sun/report.html").find("Shadows: 0 of "), std::string::npos);
+    EXPECT_EQ(point["audit"]["shadow_pixels"], 0) << "it casts none";
+    EXPECT_EQ(test::slurp(folder / "point/report.html").find("Shadows:"), std::string::npos);
+}
+
 /// A chunk that two instances need lies in its file once.
 TEST(SceneStudy, CountsTheBytesOfSharedChunksOnce) {
     const test::TempFolder folder;

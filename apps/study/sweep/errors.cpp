@@ -145,7 +145,7 @@ Flicker flickerOf(const render::Image& frame, const render::Image& moved, const 
 
 std::span<const ErrorColumn> errorColumns() {
     using E = CellErrors;
-    static constexpr std::array<ErrorColumn, 36> kColumns{{{"stated_px", &E::stated},
+    static constexpr std::array<ErrorColumn, 41> kColumns{{{"stated_px", &E::stated},
                                                            {"records", &E::records},
                                                            {"triangles", &E::triangles},
                                                            {"nodes", &E::nodes},
@@ -180,7 +180,12 @@ std::span<const ErrorColumn> errorColumns() {
                                                            {"pop_max", &E::popMost},
                                                            {"pop_faded_p999", &E::popFaded},
                                                            {"flicker_mean", &E::flickerMean},
-                                                           {"flicker_p99", &E::flickerP99}}};
+                                                           {"flicker_p99", &E::flickerP99},
+                                                           {"shadow_pixels", &E::shadowPixels},
+                                                           {"shadow_wrong", &E::shadowWrong},
+                                                           {"shadow_beyond", &E::shadowBeyond},
+                                                           {"shadow_px_max", &E::shadowMost},
+                                                           {"shadow_stated_px", &E::shadowStated}}};
     return kColumns;
 }
 

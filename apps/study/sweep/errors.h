@@ -6,6 +6,7 @@
 #include <array>
 #include <functional>
 #include <limits>
+#include <optional>
 
 #include "apps/study/audit/audit.h"
 #include "apps/study/sweep/plan.h"
@@ -40,6 +41,9 @@ struct CellErrors {
     double popFaded = kNone;  ///< as popP999, of means of kFadeFrames frames over which levels fade, at the small size
     // The camera turned by a quarter of a pixel (flickerOf): of 255
     double flickerMean = kNone, flickerP99 = kNone;
+    // Shadows of the first light that casts, of the first camera of a path at one target (audit/shadows.h): pixels that
+    // it falls on, wrong ones, and those beyond what is stated of borders; px
+    double shadowPixels = kNone, shadowWrong = kNone, shadowBeyond = kNone, shadowMost = kNone, shadowStated = kNone;
 };
 struct ErrorColumn {
     const char* name;  ///< as in CSV and JSON
@@ -67,10 +71,17 @@ lod::View turnedBy(const lod::View& view, double pixels);  ///< to the right
 Flicker flickerOf(const render::Image& frame, const render::Image& moved, const render::Image& traced,
                   const render::Image& tracedMoved);
 
+/// What rays say of a light's shadows; `open`: without them.
+struct LightTruth {
+    size_t light = 0;  ///< of DrawSettings::lights
+    render::Image open;
+    std::vector<double> shares;
+};
 /// What all cells of one view share. `moved`: turned by kFlickerPixels.
 struct ViewTruth {
     render::Image traced, tracedMoved;
     lod::View view, small, moved;
+    std::optional<LightTruth> light;  ///< nothing: shadows are not looked at
 };
 
 /// A worst place, enlarged: ours, traced, and what is seen of the difference (FLIP).

@@ -48,6 +48,23 @@ std::string mainTable(const Panel& panel) {
     return out + "</table>\n";
 }
 
+std::string shadowViolations(const Panel& panel) {
+    double pixels = 0, beyond = 0, most = 0, stated = 0;
+    for (const Summary* s : panel) {
+        const CellErrors& e = s->errors;
+        if (!(e.shadowPixels > 0)) continue;
+        pixels += e.shadowPixels;
+        beyond += e.shadowBeyond;
+        most = std::max(most, e.shadowMost);
+        stated = std::max(stated, e.shadowStated);
+    }
+    if (!(pixels > 0)) return "";
+    return fmt::format(
+        "<p class={}>Shadows: {:.0f} of {:.0f} pixels that a light falls on are wrong by more than is stated of their "
+        "borders (the farthest wrong one {:.1f} px, {:.1f} stated at most).</p>\n",
+        beyond > 0 ? "bad" : "good", beyond, pixels, most, stated);
+}
+
 std::string violations(const Panel& panel) {
     double beyond = 0, audited = 0;
     for (const Summary* s : panel) {
@@ -56,8 +73,10 @@ std::string violations(const Panel& panel) {
     }
     if (!(audited > 0)) return "<p>Distances from the full detail were not measured.</p>\n";
     return fmt::format(
-        "<p class={}>{:.0f} of {:.0f} pixels are farther from the full detail than stated and half a pixel.</p>\n",
-        beyond > 0 ? "bad" : "good", beyond, audited);
+               "<p class={}>{:.0f} of {:.0f} pixels are farther from the full detail than stated and half a "
+               "pixel.</p>\n",
+               beyond > 0 ? "bad" : "good", beyond, audited) +
+           shadowViolations(panel);
 }
 
 std::string atFixed(const Panel& panel, const StudySettings& settings) {

@@ -120,8 +120,12 @@ json jsonOfStudy(const std::vector<StudyScene>& scenes, const StudyResult& resul
                       {"audited_against", scene.against.empty() ? "leaves" : scene.againstName}});
     for (const TruthCheck& t : result.truths)
         truths.push_back({{"scene", t.scene}, {"size", t.size}, {"doubled_db", numberJson(t.decibels)}});
-    uint64_t beyond = 0, audited = 0;
+    uint64_t beyond = 0, audited = 0, shadowPixels = 0, shadowBeyond = 0;
     for (const Summary& a : all) {
+        if (a.errors.shadowPixels > 0) {
+            shadowPixels += static_cast<uint64_t>(a.errors.shadowPixels);
+            shadowBeyond += static_cast<uint64_t>(a.errors.shadowBeyond);
+        }
         json passes;
         for (const auto& [name, ms] : a.passes) passes[name] = ms;
         const glm::uvec2 size = s.sizes[a.of.size];
@@ -141,22 +145,24 @@ json jsonOfStudy(const std::vector<StudyScene>& scenes, const StudyResult& resul
         beyond += static_cast<uint64_t>(a.errors.beyond);
         audited += static_cast<uint64_t>(a.errors.audited);
     }
-    return {{"provenance", provenanceJson(result.provenance)},
-            {"scenes", of},
-            {"plan",
-             {{"cells", result.cells.size()},
-              {"blocks", s.blocks},
-              {"frames", s.frames},
-              {"samples", s.samples},
-              {"seed", s.seed},
-              {"targets_px", s.targets}}},
-            {"truth", truths},
-            {"audit", {{"pixels", audited}, {"beyond", beyond}}},
-            {"configurations", list},
-            {"budgets", budgets},
-            {"originals", originalsJson(scenes, result)},
-            {"arrivals", arrivalsJson(scenes, result)},
-            {"not_measured", result.notes}};
+    return {
+        {"provenance", provenanceJson(result.provenance)},
+        {"scenes", of},
+        {"plan",
+         {{"cells", result.cells.size()},
+          {"blocks", s.blocks},
+          {"frames", s.frames},
+          {"samples", s.samples},
+          {"seed", s.seed},
+          {"targets_px", s.targets}}},
+        {"truth", truths},
+        {"audit",
+         {{"pixels", audited}, {"beyond", beyond}, {"shadow_pixels", shadowPixels}, {"shadow_beyond", shadowBeyond}}},
+        {"configurations", list},
+        {"budgets", budgets},
+        {"originals", originalsJson(scenes, result)},
+        {"arrivals", arrivalsJson(scenes, result)},
+        {"not_measured", result.notes}};
 }
 
 std::string describeKept(const KeptAudit& k) {

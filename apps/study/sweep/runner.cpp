@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "apps/study/statistics/intervals.h"
+#include "apps/study/sweep/shadow_errors.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 
@@ -93,6 +94,9 @@ Result<void> measureView(Run& run, uint32_t first, const FullDetail* full, Scene
     STIPPLE_TRY(checkTruth(run, truths, at, truth));
     STIPPLE_ASSIGN(SceneDrawer* const drawer, run.drawerOf(at.scene));
     const bool isFirst = scene.views[at.view].number == 0 && at.size == 0;
+    if (isFirst) {
+        STIPPLE_ASSIGN(truth.light, lightTruthOf(scene, truth.view, run.host.executor));
+    }
     const CellTools tools{*drawer, isFirst ? &oracle : nullptr, full, run.host.executor, truth};
     render::Image leaves;
     for (uint32_t c = first; c < first + count; ++c) {
@@ -103,9 +107,12 @@ Result<void> measureView(Run& run, uint32_t first, const FullDetail* full, Scene
         if (run.isMeasured[c]) continue;
         STIPPLE_TRY(run.host.say("errors", c, cells.size()));
         KeepCrop keep;
-        if (cells[c].target == cropTarget(s) && !cells[c].hasBudget())
+        const bool isLookedAt = cells[c].target == cropTarget(s) && !cells[c].hasBudget();
+        if (isLookedAt)
             keep = [&](const render::Image& crop) { return image::writeImage(s.output + "/" + cropName(c), crop); };
         STIPPLE_ASSIGN(run.result.errors[c], measureCell(tools, cells[c], leaves, keep));
+        if (isLookedAt && truth.light)
+            STIPPLE_TRY(auditShadowsOf(*drawer, *truth.light, truth.view, cells[c], run.result.errors[c]));
         STIPPLE_TRY(journal.append({rowOf(c, run.result.errors[c])}));
         run.isMeasured[c] = 1;
     }

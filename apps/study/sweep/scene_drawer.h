@@ -22,6 +22,11 @@ class SceneDrawer {
     Result<void> again(const lod::View& view, render::Mode mode, double target, uint64_t records = kAllRecords);
     /// What there is by now, and asks for what is missing (render::renderFrame).
     Result<const render::Image*> drawArrived(const lod::View& view, render::Mode mode, double target);
+    /// Of the scene; those of the frames that follow.
+    const std::vector<render::WorldLight>& lights() const { return draw_.lights; }
+    void setLights(std::vector<render::WorldLight> lights) { draw_.lights = std::move(lights); }
+    /// Of the last frame.
+    const render::FrameState& state() const { return *state_; }
     const FrameCounters& counters() const { return state_->counters; }
     const std::vector<render::PassTime>& passes() const { return backend_->passTimes(); }
     /// Of the chunks that the last cut needs, as they lie in their files.

@@ -1,0 +1,17 @@
+// Borders of shadows in the frame of a cell: which pixels a light comes to, against rays through the full detail
+// (audit/shadows.h).
+#pragma once
+
+#include <optional>
+
+#include "apps/study/sweep/errors.h"
+
+namespace stipple::study {
+
+/// Of the first light of a scene that casts shadows, if shadows are asked for; nothing: there is none.
+Result<std::optional<LightTruth>> lightTruthOf(const StudyScene& scene, const lod::View& view, Executor& executor);
+
+Result<void> auditShadowsOf(SceneDrawer& drawer, const LightTruth& truth, const lod::View& view, const Cell& cell,
+                            CellErrors& errors);
+
+}  // namespace stipple::study
