@@ -23,8 +23,8 @@ class SceneDrawer {
     /// What there is by now, and asks for what is missing (render::renderFrame).
     Result<const render::Image*> drawArrived(const lod::View& view, render::Mode mode, double target);
     /// Of the scene; those of the frames that follow.
-    const std::vector<render::WorldLight>& lights() const { return draw_.lights; }
-    void setLights(std::vector<render::WorldLight> lights) { draw_.lights = std::move(lights); }
+    const render::DrawSettings& drawSettings() const { return draw_; }
+    void setDrawSettings(render::DrawSettings draw) { draw_ = std::move(draw); }
     /// Of the last frame.
     const render::FrameState& state() const { return *state_; }
     const FrameCounters& counters() const { return state_->counters; }

@@ -8,7 +8,7 @@
 
 namespace stipple::study {
 
-/// Of the first light of a scene that casts shadows, if shadows are asked for; nothing: there is none.
+/// Of the first light of a scene that may cast shadows, as if they were asked for; nothing: there is none.
 Result<std::optional<LightTruth>> lightTruthOf(const StudyScene& scene, const lod::View& view, Executor& executor);
 
 Result<void> auditShadowsOf(SceneDrawer& drawer, const LightTruth& truth, const lod::View& view, const Cell& cell,
