@@ -145,7 +145,7 @@ Flicker flickerOf(const render::Image& frame, const render::Image& moved, const 
 
 std::span<const ErrorColumn> errorColumns() {
     using E = CellErrors;
-    static constexpr std::array<ErrorColumn, 41> kColumns{{{"stated_px", &E::stated},
+    static constexpr std::array<ErrorColumn, 42> kColumns{{{"stated_px", &E::stated},
                                                            {"records", &E::records},
                                                            {"triangles", &E::triangles},
                                                            {"nodes", &E::nodes},
@@ -182,6 +182,7 @@ std::span<const ErrorColumn> errorColumns() {
                                                            {"flicker_mean", &E::flickerMean},
                                                            {"flicker_p99", &E::flickerP99},
                                                            {"shadow_pixels", &E::shadowPixels},
+                                                           {"shadow_dark", &E::shadowDark},
                                                            {"shadow_wrong", &E::shadowWrong},
                                                            {"shadow_beyond", &E::shadowBeyond},
                                                            {"shadow_px_max", &E::shadowMost},

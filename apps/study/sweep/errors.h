@@ -42,8 +42,9 @@ struct CellErrors {
     // The camera turned by a quarter of a pixel (flickerOf): of 255
     double flickerMean = kNone, flickerP99 = kNone;
     // Shadows of the first light that casts, of the first camera of a path at one target (audit/shadows.h): pixels that
-    // it falls on, wrong ones, and those beyond what is stated of borders; px
-    double shadowPixels = kNone, shadowWrong = kNone, shadowBeyond = kNone, shadowMost = kNone, shadowStated = kNone;
+    // it falls on, of those the shadowed and the wrong ones, and those beyond what is stated of borders; px
+    double shadowPixels = kNone, shadowDark = kNone, shadowWrong = kNone, shadowBeyond = kNone, shadowMost = kNone,
+           shadowStated = kNone;
 };
 struct ErrorColumn {
     const char* name;  ///< as in CSV and JSON

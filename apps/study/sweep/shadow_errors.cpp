@@ -53,6 +53,7 @@ Result<void> auditShadowsOf(SceneDrawer& drawer, const LightTruth& truth, const 
     const std::vector<double> stated = statedBorders(drawer.state(), view, truth.open, scene.lights[truth.light]);
     const ShadowAudit audit = auditShadows(lightShares({*with, *open, *dark}), truth.shares, stated, view.width);
     errors.shadowPixels = static_cast<double>(audit.lookedAt);
+    errors.shadowDark = static_cast<double>(audit.dark);
     errors.shadowWrong = static_cast<double>(audit.wrong);
     errors.shadowBeyond = static_cast<double>(audit.beyond);
     errors.shadowMost = audit.worst;

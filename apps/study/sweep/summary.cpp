@@ -15,7 +15,7 @@ Together howOf(double CellErrors::*column) {
     for (const auto decibels : {&E::lodDecibels, &E::backendDecibels, &E::psnr, &E::psnrForeground, &E::leavesDecibels})
         if (column == decibels) return Together::decibels;
     for (const auto sum : {&E::audited, &E::beyond, &E::outline, &E::gap, &E::between, &E::other, &E::holes, &E::spill,
-                           &E::shadowPixels, &E::shadowWrong, &E::shadowBeyond})
+                           &E::shadowPixels, &E::shadowDark, &E::shadowWrong, &E::shadowBeyond})
         if (column == sum) return Together::sum;
     for (const auto most : {&E::stated, &E::lodMost, &E::lodP99, &E::depthP99, &E::bytes, &E::popP999, &E::popMost,
                             &E::popFaded, &E::flickerP99, &E::shadowMost, &E::shadowStated})
