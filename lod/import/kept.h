@@ -3,9 +3,9 @@
 
 #include <any>
 #include <map>
-#include <mutex>
 #include <string>
 
+#include "engine/base/one_at_a_time.h"
 #include "engine/base/result.h"
 
 namespace stipple::lod {
@@ -17,15 +17,16 @@ class Kept {
     /// What is there under that name, or what `make` gives, a Result<T>. One thread at a time.
     template <typename T, typename Make>
     Result<T> once(const std::string& name, const Make& make) {
-        const std::lock_guard lock(mutex_);
-        if (const auto at = made_.find(name); at != made_.end()) return std::any_cast<T>(at->second);
-        STIPPLE_ASSIGN(T made, make());
-        made_.emplace(name, made);
-        return made;
+        return turns_([&]() -> Result<T> {
+            if (const auto at = made_.find(name); at != made_.end()) return std::any_cast<T>(at->second);
+            STIPPLE_ASSIGN(T made, make());
+            made_.emplace(name, made);
+            return made;
+        });
     }
 
   private:
-    std::mutex mutex_;
+    OneAtATime turns_;
     std::map<std::string, std::any> made_;
 };
 

@@ -13,12 +13,12 @@ namespace {
 
 constexpr size_t kNeighbours = 16, kFewest = 5, kForQuadratic = 10;
 constexpr double kUsualReach = 2.5, kFarReach = 4;  ///< spacings, of neighbours; the farther where there are few
-constexpr double kSupport = 1.5;                 ///< h, spacings
-constexpr double kSameSide = 0.3;                ///< cosine between normals of one sheet
-constexpr double kSheet = 0.75;                  ///< h, from the plane of the guide
-constexpr double kBesideBorder = 0.7;            ///< spacings, as far as the surface goes on beyond its last points
-constexpr double kSteepest = 3.732;              ///< tan 75 degrees
-constexpr double kLoose = 0.25;                  ///< h, of the weighted residuals
+constexpr double kSupport = 1.5;                    ///< h, spacings
+constexpr double kSameSide = 0.3;                   ///< cosine between normals of one sheet
+constexpr double kSheet = 0.75;                     ///< h, from the plane of the guide
+constexpr double kBesideBorder = 0.7;               ///< spacings, as far as the surface goes on beyond its last points
+constexpr double kSteepest = 3.732;                 ///< tan 75 degrees
+constexpr double kLoose = 0.25;                     ///< h, of the weighted residuals
 
 float squaredReach(float spacing, bool isFar) {
     const double limit = (isFar ? kFarReach : kUsualReach) * static_cast<double>(spacing);
