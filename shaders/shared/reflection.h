@@ -107,8 +107,8 @@ SHARED_FN float mirrorBehind(float z, float depth) { return depth > 0.0f ? z - d
 SHARED_FN float mirrorOff(Lens lens, float z, float zBefore, float depth, float facing, float next) {
     const float pixel = lensDepth(lens, depth) / lens.focal;
     const float steepest = sqrt(max(1.0f - facing * facing, 0.0f)) / max(facing, kMirrorGrazing) * pixel;
-    const float half = 0.5f * min(max(depth - next, -steepest), steepest);
-    return abs(z - depth - half) / (abs(z - zBefore) + pixel + abs(half));
+    const float into = 0.5f * min(max(depth - next, -steepest), steepest);
+    return abs(z - depth - into) / (abs(z - zBefore) + pixel + abs(into));
 }
 const float kMirrorFarOff = 2.0f;  // from there on it passes
 
