@@ -196,6 +196,7 @@ Streamer::Fate Streamer::settle(Request& request, uint64_t& uploaded) {
         life.retryAt = frame_ + kRetryFrames;
         return drop(counters_.refused);
     }
+    (void)groupOfFrame();  // what may want memory comes before what must not stop half-way
     if (const auto result = sink_.upload(key, std::move(*request.chunk)); !result) {
         setState(key, ChunkState::failed);
         life.retryAt = frame_ + kRetryFrames;
@@ -238,11 +239,14 @@ void Streamer::link(ChunkKey key) { linkAfter(groups_[lifeOf(key).used].end.befo
 
 uint32_t Streamer::groupOfFrame() {
     const ChunkKey last = groups_.front().end.before;  // an end: of the newest group, or of the list
-    if (last.chunk != 0 && last.source == kGroupEnd && groups_[last.chunk].frame == frame_) return last.chunk;
+    if (last.chunk != 0 && (groups_[last.chunk].frame == frame_ || groups_[last.chunk].chunks == 0)) {
+        groups_[last.chunk].frame = frame_;
+        return last.chunk;
+    }
     if (spareGroups_.empty()) {
-        spareGroups_.push_back(static_cast<uint32_t>(groups_.size()));
         groups_.emplace_back();
         spareGroups_.reserve(groups_.capacity());
+        spareGroups_.push_back(static_cast<uint32_t>(groups_.size() - 1));
     }
     const uint32_t group = spareGroups_.back();
     spareGroups_.pop_back();

@@ -83,8 +83,8 @@ class Streamer {
     void request(const lod::Cut& cut);
 
     // For pictures that hang on a plan and not on time; nothing may be on its way from the executor.
-    /// Drops what arrived and is not in the plan; of what is resident and not in it, the least recently used until the
-    /// plan has room: all of it where the plan is not complete, as then it would show.
+    /// Drops what arrived and is not in the plan; of what is resident and not in it, the least recently used (chunks of
+    /// roots last) until the plan has room: all of it where the plan is not complete, as then it would show.
     void makeRoomFor(const lod::ResidentPlan& plan);
     /// As request: starts what the plan has and what is not there.
     void request(const lod::ResidentPlan& plan);

@@ -50,11 +50,10 @@ std::optional<int> study(std::vector<std::string> arguments) {
     for (std::string place : places) {
         given.front() = place.data();
         ::execv(place.c_str(), given.data());
-        if (errno != ENOENT && errno != ENOTDIR)
-            return app::report({ErrorKind::input, std::strerror(errno), place, "install stipple anew"});
     }
-    return app::report({ErrorKind::input, "the program of studies is not there", places.front(),
-                        "build the target stipple_study, or install stipple anew"});
+    return app::report({ErrorKind::input,
+                        fmt::format("the program of studies does not start: {}", std::strerror(errno)), places.front(),
+                        "build the target stipple_studies, or install stipple anew"});
 }
 
 }  // namespace

@@ -112,11 +112,15 @@ int stipple_scene_overview(const stipple_scene* scene, double aspect, stipple_ca
 void stipple_scene_close(stipple_scene* scene) { delete scene; }
 
 int stipple_renderer_create(const stipple_device* device, const stipple_scene* scene, stipple_renderer** renderer) {
+    return stipple_renderer_create_sized(device, scene, uint64_t{1} << 30, renderer);
+}
+int stipple_renderer_create_sized(const stipple_device* device, const stipple_scene* scene, uint64_t resident_bytes,
+                                  stipple_renderer** renderer) {
     return guarded([&] {
         if (device == nullptr || scene == nullptr || renderer == nullptr)
             return refused("device, scene and renderer must be given");
         *renderer = nullptr;
-        auto made = v1::Renderer::create(device->it, scene->it);
+        auto made = v1::Renderer::create(device->it, scene->it, resident_bytes);
         if (!made) return failed(made.error());
         *renderer = new stipple_renderer{std::move(*made)};
         return 0;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "engine/base/isolated.h"
 #include "engine/base/one_at_a_time.h"
 
 namespace stipple::v1 {
@@ -41,16 +42,20 @@ scene::OpenSettings openSettings(uint64_t memoryBytes, unsigned threads, uint64_
     settings.threads = static_cast<int>(threads);
     settings.surfels = surfels;
     const auto turns = std::make_shared<OneAtATime>();
+    const auto calls = [turns](const auto& call) { (*turns)([&] { isolated(call); }); };
     if (listener.note)
         settings.say =
-            settings.loss = [turns, call = listener.note](const std::string& line) { (*turns)([&] { call(line); }); };
+            settings.loss = [calls, call = listener.note](const std::string& line) { calls([&] { call(line); }); };
     if (listener.progress)
-        settings.onProgress = [turns, call = listener.progress](const ProgressReport& r) {
-            (*turns)([&] { call({r.stage, r.fraction, r.secondsLeft}); });
+        settings.onProgress = [calls, call = listener.progress](const ProgressReport& r) {
+            calls([&] { call({r.stage, r.fraction, r.secondsLeft}); });
         };
     const auto isOver = std::make_shared<std::atomic<bool>>(false);
-    settings.isStopped = [turns, isOver, call = listener.isStopped] {
-        if (call && !*isOver && (*turns)(call)) *isOver = true;
+    settings.isStopped = [calls, isOver, call = listener.isStopped] {
+        if (call && !*isOver)
+            calls([&] {
+                if (!*isOver && call()) *isOver = true;
+            });
         return isOver->load();
     };
     return settings;

@@ -137,9 +137,10 @@ void give(const render::Image& from, Image& to) {
     to.linear = from.linear;
 }
 
-FrameInfo infoOf(const FrameCounters& c) {
+FrameInfo infoOf(const render::FrameState& state) {
+    const FrameCounters& c = state.counters;
     FrameInfo info;
-    info.isComplete = c.nodesMissing == 0 && !c.budgetTruncated;
+    info.isComplete = state.cut.wanted.empty() && !c.budgetTruncated;
     info.errorPixels = c.tauEffectivePixels;
     info.records = c.recordsDrawn;
     info.triangles = c.trianglesDrawn;
@@ -150,17 +151,18 @@ FrameInfo infoOf(const FrameCounters& c) {
 }
 
 /// Why the view has not all that it wants.
-::stipple::Result<void> incomplete(const Renderer::Held& r, bool isWhole) {
-    constexpr const char* kHint = "renderFrame draws what is there";
+::stipple::Result<void> incomplete(const Renderer::Held& r) {
+    constexpr const char* kHint = "give more, or take what renderFrame draws";
     const auto over = [](const std::string& what) { return fail(::stipple::ErrorKind::budget, what, "", kHint); };
     const FrameCounters& c = r.state->counters;
-    if (!isWhole && c.failures > 0)
-        return fail(::stipple::ErrorKind::input,
-                    "a part of the scene cannot be read: " + r.state->streamer->lastFailure(), "", kHint);
+    const streaming::Streamer& streamer = *r.state->streamer;
+    if (!streamer.failed(true).empty())
+        return fail(::stipple::ErrorKind::input, "a part of the scene cannot be read: " + streamer.lastFailure(), "",
+                    "renderFrame draws what is there");
     if (c.budgetTruncated) return over("the coarsest level of the scene has more records than budgetRecords");
-    return over(fmt::format("{} of {} that the view wants do not fit into residentBytes, {}: an error of {:.2f} px",
-                            c.nodesMissing, counted(c.nodesMissing + c.nodesDrawn, "node"),
-                            humanBytes(r.state->streamer->residentLimit()), c.tauEffectivePixels));
+    return over(fmt::format("of what the view wants {} do not fit into residentBytes, {}: an error of {:.2f} px",
+                            counted(r.state->cut.wanted.size(), "chunk"), humanBytes(streamer.residentLimit()),
+                            c.tauEffectivePixels));
 }
 
 /// `waits`: until nothing is missing.
@@ -176,12 +178,12 @@ FrameInfo infoOf(const FrameCounters& c) {
     const lod::View view = scene::makeView(eye, width, height, scene::nearPlaneOf(r.scene));
     if (waits) {
         STIPPLE_ASSIGN(const bool isWhole, render::renderUntilComplete(*r.state, view, frame));
-        r.info = infoOf(r.state->counters);
-        if (!r.info.isComplete) return incomplete(r, isWhole);
+        r.info = infoOf(*r.state);
+        if (!isWhole || !r.info.isComplete) return incomplete(r);
     } else {
         STIPPLE_TRY(render::renderFrame(*r.state, view, frame));
     }
-    r.info = infoOf(r.state->counters);
+    r.info = infoOf(*r.state);
     return {};
 }
 

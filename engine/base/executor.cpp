@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include "engine/base/isolated.h"
+
 namespace stipple {
 namespace {
 
@@ -200,6 +202,8 @@ class SerialExecutor final : public Executor {
 };
 
 }  // namespace
+
+void isolated(const std::function<void()>& work) { tbb::this_task_arena::isolate(work); }
 
 std::unique_ptr<Executor> makeTbbExecutor(int threads) {
 #ifdef __SANITIZE_THREAD__

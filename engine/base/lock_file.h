@@ -24,7 +24,7 @@ class LockFile {
     /// Places are below 2^62.
     /// Together with others who share it. False: somebody holds it alone. (Where the file system has no locks: true.)
     bool tryShare(uint64_t place) const;
-    /// Alone. False: somebody else holds it.
+    /// Alone. False: somebody else holds it (not where a thread shares it by this very object).
     bool tryTake(uint64_t place) const;
     void release(uint64_t place) const;
     /// By somebody else, shared or alone.

@@ -9,6 +9,7 @@ struct alignas(64) MirrorLanes {
     float steps[kTile], onePixel[kTile], share[kTile];
     float isInFront[kTile];                       // of the step before
     float passed[kTile];                          // the last step that has passed behind something
+    float things[kTile];                          // that were passed
     float found[kTile];                           // the step that meets something, or 0
     float low[kTile], high[kTile];                // between which shares of the way
     float off[kTile];                             // there, mirrorOff
@@ -70,6 +71,7 @@ struct alignas(64) MirrorLanes {
         m.onePixel[i] = r.onePixel;
         m.share[i] = r.share;
         m.passed[i] = 0.0f;
+        m.things[i] = 0.0f;
         m.found[i] = 0.0f;
     }
 }
@@ -156,6 +158,7 @@ struct alignas(64) MirrorLanes {
         const bool goesOn = passes[i] > 0.0f;
         m.steps[i] = (goesOn ? 1.0f : m.found[i]) > 0.0f ? m.steps[i] : 0.0f;
         m.passed[i] = goesOn ? m.found[i] : m.passed[i];
+        m.things[i] += goesOn ? 1.0f : 0.0f;
         m.found[i] = goesOn ? 0.0f : m.found[i];
     }
     return any > 0.0f;
@@ -182,7 +185,7 @@ struct alignas(64) MirrorLanes {
                                          m.off[i], std::sqrt(dot(way, way)));
         m.hitX[i] = x;
         m.hitY[i] = y;
-        m.share[i] = m.found[i] > 0.0f ? m.share[i] * hitShare : 0.0f;
+        m.share[i] = m.found[i] > 0.0f ? m.share[i] * mirrorPassed(m.things[i]) * hitShare : 0.0f;
     }
 }
 

@@ -95,7 +95,8 @@ vec3 mirrored(uvec2 pixel) {
     const float x = m.x + high * m.dx, y = m.y + high * m.dy, z = mirrorDepth(lens, m.linear, m.dLinear, high);
     const vec2 size = pictureSize();
     const vec3 n = octDecode(surfaceBuffer[entryAt(mirrorPixel(x, size.x), mirrorPixel(y, size.y))].normal);
-    const float share = m.share * mirrorHit(reflection, size, m.direction, n, x, y, off, distance(placeAt(x, y, z), place));
+    const float share = m.share * mirrorPassed(float(int(tries) - 1)) *
+                        mirrorHit(reflection, size, m.direction, n, x, y, off, distance(placeAt(x, y, z), place));
     if (!(share > 0.0)) return vec3(0.0);
     return mirrorAdded(s, share * lightMet(x, y, mirrorSurroundings(frame, s, m.direction)));
 }

@@ -10,9 +10,9 @@
 //                     \_ . _ . _ x
 //
 // How much of the light that is met counts is a product of shares that fade to nothing: with roughness, for rays that
-// come back to the eye, at the picture's border, at the end of the way, as it is farther behind, and where that
-// shows another side than the ray meets. So nothing comes or goes at once, and what does not count leaves the
-// surroundings where they were.
+// come back to the eye, at the picture's border, at the end of the way, as it is farther behind, behind several things
+// that the ray passes behind, and where that shows another side than the ray meets. So nothing comes or goes at once,
+// and what does not count leaves the surroundings where they were.
 //
 //     added light = mirrorShare x sum of those shares x (light of what is met - light of the surroundings)
 #ifndef STIPPLE_SHARED_REFLECTION_H
@@ -34,7 +34,7 @@ const float kMirrorTowards = 0.9f;     // of the way to the eye's plane
 const float kMirrorBorder = 0.0625f;   // of the picture's shorter side: there it fades
 const float kMirrorGrazing = 0.0625f;  // cosine to the eye from which on surfaces are as deep as that
 const uint kMirrorHalvings = 6u;
-const uint kMirrorTries = 4u;  // things that rays pass behind at most, and one more
+const uint kMirrorTries = 4u;  // behind so many things nothing is met
 
 // Does a pixel of that word (surface.h) mirror the picture? `shade`: of the frame.
 SHARED_FN bool isMirror(uint word, uint shade) {
@@ -103,14 +103,17 @@ SHARED_FN float mirrorBehind(float z, float depth) { return depth > 0.0f ? z - d
 // ray (`zBefore`: one pixel before); `depth`, `facing`: of the pixel where it is behind, its normal's cosine to the
 // eye; `next`: the depth of the picture one pixel on. From a pixel to the next depths go as they go from this one to
 // the one before it, but no steeper than the normal says: of ground that is exact, of a rim, which lets rays behind,
-// much less than its normal has it.
+// much less than its normal has it. (Where nothing is next, it is far.)
 SHARED_FN float mirrorOff(Lens lens, float z, float zBefore, float depth, float facing, float next) {
     const float pixel = lensDepth(lens, depth) / lens.focal;
     const float steepest = sqrt(max(1.0f - facing * facing, 0.0f)) / max(facing, kMirrorGrazing) * pixel;
-    const float into = 0.5f * min(max(depth - next, -steepest), steepest);
+    const float into = 0.5f * (next > 0.0f ? min(max(depth - next, -steepest), steepest) : -steepest);
     return abs(z - depth - into) / (abs(z - zBefore) + pixel + abs(into));
 }
 const float kMirrorFarOff = 2.0f;  // from there on it passes
+// How much counts what is met behind so many things that the ray has passed: at the fourth it is not followed on, and
+// that must not come at once.
+SHARED_FN float mirrorPassed(float things) { return clampedShare((float(int(kMirrorTries)) - things) / 3.0f); }
 
 // What of the light that is met counts. `n`: there; (x, y): px; `off`: mirrorOff, `distance`: how far from its surface
 // the ray is.

@@ -1,8 +1,10 @@
 // The library where a host has threads, listens, stops, and has less memory than a view wants.
+#include <stipple/c.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <mutex>
+#include <set>
 #include <thread>
 #include <vector>
 
@@ -86,11 +88,13 @@ TEST_F(ApiThreads, SceneFilesAreOpenedAtOnce) {
 /// Each of a listener's calls comes while no other runs, whatever threads build.
 TEST_F(ApiThreads, AListenerIsCalledByOneAtATime) {
     std::atomic<int> inside{0}, most{0}, asked{0};
+    std::set<std::thread::id> threads;  // that called
     const auto call = [&] {
         const int now = ++inside;
         for (int before = most; before < now && !most.compare_exchange_weak(before, now);) {
         }
-        std::this_thread::sleep_for(std::chrono::microseconds(200));
+        if (now == 1) threads.insert(std::this_thread::get_id());
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));  // others come meanwhile
         --inside;
     };
     stipple::BuildSettings s;
@@ -102,11 +106,12 @@ TEST_F(ApiThreads, AListenerIsCalledByOneAtATime) {
         ++asked;
         return false;
     };
-    const auto points = stipple::build({writeBall("heard.ply")}, at("points.stipple"), s);
-    EXPECT_TRUE(points) << points.error().line();
-    const auto triangles = stipple::build({writeTriangle("heard")}, at("triangles.stipple"), s);
-    EXPECT_TRUE(triangles) << triangles.error().line();
+    std::vector<std::string> balls;
+    for (int i = 0; i < 12; ++i) balls.push_back(writeBall("heard" + std::to_string(i) + ".ply", 3 * i, 20000));
+    const auto built = stipple::build(balls, at("heard.stipple"), s);
+    EXPECT_TRUE(built) << built.error().line();
     EXPECT_GT(asked, 0);
+    EXPECT_GT(threads.size(), 1u) << "(several threads have something to ask)";
     EXPECT_EQ(most, 1);
 }
 
@@ -128,7 +133,7 @@ TEST_F(ApiThreads, AStopIsHeardWhereverACallIs) {
 /// While another thread builds it, and never ends.
 TEST_F(ApiThreads, AStopIsHeardWhileWaitingForABuild) {
     const std::string ball = writeBall("waited.ply");
-    std::atomic<bool> isBuilding{false}, mayEnd{false};
+    std::atomic<bool> isBuilding{false}, mayEnd{false}, isOver{false};
     std::thread builder([&] {
         stipple::OpenSettings s;
         s.listener.isStopped = [&] {
@@ -137,8 +142,9 @@ TEST_F(ApiThreads, AStopIsHeardWhileWaitingForABuild) {
             return false;
         };
         EXPECT_TRUE(stipple::Scene::open({ball}, s));
+        isOver = true;
     });
-    while (!isBuilding) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (!isBuilding && !isOver) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     stipple::OpenSettings s;
     std::atomic<bool> hasWaited{false};
     s.listener.note = [&](const std::string& line) {
@@ -167,6 +173,8 @@ TEST_F(ApiThreads, AHostMayHaveClosedItsStandardStreams) {
     const auto open = [&] {
         for (int descriptor = 0; descriptor < 4; ++descriptor) ::close(descriptor);
         const auto scene = stipple::Scene::open({vdb});
+        fs::remove_all(folder_);
+        fs::remove_all(std::getenv("XDG_CACHE_HOME"));
         ::_exit(scene ? 42 : static_cast<int>(scene.error().kind));
     };
     EXPECT_EXIT(open(), testing::ExitedWithCode(42), "");
@@ -196,6 +204,21 @@ TEST_F(ApiThreads, TooLittleMemoryIsAnErrorOfRender) {
     EXPECT_FALSE(drawn->isComplete);
     EXPECT_GT(drawn->records, 0u);
     EXPECT_GT(drawn->errorPixels, 1);
+    stipple_device* device = nullptr;  // in C
+    stipple_scene* own = nullptr;
+    stipple_renderer* small = nullptr;
+    const std::string path = at("tight.ply");
+    const char* const input = path.c_str();
+    ASSERT_EQ(stipple_device_open("cpu", &device), 0);
+    ASSERT_EQ(stipple_scene_open(&input, 1, &own), 0);
+    ASSERT_EQ(stipple_renderer_create_sized(device, own, wanted / 2, &small), 0);
+    stipple_camera eye{};
+    ASSERT_EQ(stipple_scene_overview(own, 1, &eye), 0);
+    std::vector<uint8_t> rgba(size_t{4} * 512 * 512);
+    EXPECT_EQ(stipple_render(small, &eye, 512, 512, 1, rgba.data(), nullptr), static_cast<int>(ErrorKind::budget));
+    stipple_renderer_destroy(small);
+    stipple_scene_close(own);
+    stipple_device_close(device);
     auto enough = stipple::Renderer::create(d, scene, wanted);
     EXPECT_TRUE(enough->render(camera, 512, 512)) << "the control";
 }

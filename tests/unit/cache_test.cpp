@@ -253,7 +253,7 @@ TEST(Cache, OneOfTwoProcessesWaitsForTheOther) {
                                        std::to_string(i));
         });
     const auto waits = [&](int i) {
-        return test::slurp(place / ("err" + std::to_string(i))).find("another process") != std::string::npos;
+        return test::slurp(place / ("err" + std::to_string(i))).find("being built already") != std::string::npos;
     };
     const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(2);
     for (const int i : {0, 1})

@@ -40,6 +40,10 @@ STIPPLE_C_API void stipple_scene_close(stipple_scene* scene);
 
 STIPPLE_C_API int stipple_renderer_create(const stipple_device* device, const stipple_scene* scene,
                                           stipple_renderer** renderer);
+/* resident_bytes: of what it keeps on the device (the other has 1 GiB). Where that does not suffice for a view,
+   stipple_render gives the error of a budget. */
+STIPPLE_C_API int stipple_renderer_create_sized(const stipple_device* device, const stipple_scene* scene,
+                                                uint64_t resident_bytes, stipple_renderer** renderer);
 /* rgba: 4 * width * height bytes, rows from the top. error_pixels: tolerated; what the picture keeps comes back in
    kept_pixels, unless that is NULL. */
 STIPPLE_C_API int stipple_render(stipple_renderer* renderer, const stipple_camera* camera, uint32_t width,

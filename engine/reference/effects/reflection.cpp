@@ -56,6 +56,7 @@ class MirrorImages {
     struct Met {
         dvec2 at{0}, pixel{0};
         double depth = 0, off = 0;  ///< off: offWall
+        int passed = 0;             ///< things before it that the ray was behind
     };
     struct Ray {
         dvec2 from{0}, to{0};  ///< px
@@ -108,7 +109,8 @@ class MirrorImages {
                                                 sightOf(view_, viewRay(view_, low + 0.5).at(depth))));
         const double pixel = 1 / pixelsAt(view_, depth), tangent = std::sqrt(std::max(1 - facing * facing, 0.0));
         const double steepest = tangent / std::max(facing, 1.0 / 16) * pixel;
-        const double into = std::clamp(depth - depthOf(int(on.x), int(on.y)), -steepest, steepest) / 2;
+        const double next = depthOf(int(on.x), int(on.y));
+        const double into = (next > 0 ? std::clamp(depth - next, -steepest, steepest) : -steepest) / 2;
         return std::abs(z - (depth + into)) /
                (std::abs(z - depthAlong(r, share - 1 / r.pixels)) + pixel + std::abs(into));
     }
@@ -118,8 +120,9 @@ class MirrorImages {
         const Ray r = rayOf(begin, mirror);
         const dvec2 way = r.to - r.from;
         double share = 0;
+        int passed = 0;
         bool isInFront = true;
-        while (share < 1) {
+        while (share < 1 && passed < 4) {
             // The pixel that a little more of the way lies in, and where it ends.
             const dvec2 here = r.from + (share + 1e-9) * way;
             const dvec2 low = glm::clamp(glm::floor(here), dvec2(0), size_ - 1.0);
@@ -134,7 +137,8 @@ class MirrorImages {
             if (wall > 0 && isInFront && std::max(entry, exit) > wall) {
                 const double at = entry > wall ? share : std::clamp(shareAtDepth(r, wall), share, end);
                 const double off = offWall(r, at, low);
-                if (off < 2) return Met{r.from + at * way, low, std::max(entry, wall), off};
+                if (off < 2) return Met{r.from + at * way, low, std::max(entry, wall), off, passed};
+                ++passed;
             }
             isInFront = !(wall > 0 && exit > wall);
             share = std::max(end, share + 1e-9);
@@ -148,8 +152,8 @@ class MirrorImages {
         const double border = std::min(size_.x, size_.y) / 16;
         const double inside = std::min({met.at.x, size_.x - met.at.x, met.at.y, size_.y - met.at.y});
         const double distance = glm::length(viewRay(view_, met.at).at(met.depth) - place);
-        return faded(2 - met.off) * faded(-4 * glm::dot(n, mirror)) * faded(inside / border) *
-               faded(4 - 4 * distance / reach_);
+        return faded((4 - met.passed) / 3.0) * faded(2 - met.off) * faded(-4 * glm::dot(n, mirror)) *
+               faded(inside / border) * faded(4 - 4 * distance / reach_);
     }
 
     /// Bilinear, of what the four pixels about a place send; nothing of those that show nothing.

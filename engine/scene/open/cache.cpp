@@ -96,7 +96,7 @@ class Lookup {
         STIPPLE_TRY(cache_.use(key_, build_.isStopped));
         if (Result<StorePtr> found = openWhole(); found) return found;
         STIPPLE_TRY(cache_.lockBuild(
-            key_, [&] { tell("is being built by another process: waiting for it"); }, build_.isStopped));
+            key_, [&] { tell("is being built already: waiting for it"); }, build_.isStopped));
         Result<StorePtr> store = openOrBuild(make, limit);
         cache_.unlockBuild(key_);
         return store;
@@ -121,7 +121,7 @@ class Lookup {
 
     Result<StorePtr> openOrBuild(const StoreMaker& make, uint64_t limit) const {
         if (std::error_code error; fs::exists(path_, error)) {
-            Result<StorePtr> store = openWhole();  // another process was faster
+            Result<StorePtr> store = openWhole();  // somebody was faster
             if (store) return store;
             say(build_,
                 "note: the scene in the cache cannot be used and is built again: " + printable(store.error().line()));

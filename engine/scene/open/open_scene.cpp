@@ -492,6 +492,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Open
     OpenedScene scene;
     // The axis is of the picture: what is in the cache serves any.
     OpenSettings build = given;
+    build.kept = std::make_shared<lod::Kept>();  // of this scene
     build.up.clear();
     build.leftovers = lod::Leftovers::goOnOrReplace;
     if (isSceneFile(inputs.front())) {
