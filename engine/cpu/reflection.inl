@@ -16,6 +16,7 @@ struct alignas(64) MirrorLanes {
     float hitX[kTile], hitY[kTile];               // px
     float metR[kTile], metG[kTile], metB[kTile];  // of what is met, less what would be seen without it
     float farR[kTile], farG[kTile], farB[kTile];  // that
+    float counted[kTile];                         // shares of pixels about the place that do not turn their back
 };
 
 [[gnu::always_inline]] inline size_t takeMirrors(const FrameConstants& f, const ReflectionInput& in, size_t first,
@@ -145,11 +146,13 @@ struct alignas(64) MirrorLanes {
         const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], m.high[i]), back = m.high[i] - m.onePixel[i];
         const float zBack = mirrorDepth(lens, m.linear[i], m.dLinear[i], back);
         const int column = mirrorPixel(x, width), line = mirrorPixel(y, height), at = line * pitch + column;
-        const float on = m.onePixel[i];
+        const float on = kMirrorAhead * m.onePixel[i];
         const int next = mirrorPixel(y + on * m.dy[i], height) * pitch + mirrorPixel(x + on * m.dx[i], width);
         const vec3 toEye = towardsEye(lens, float(column) + 0.5f - centreX, float(line) + 0.5f - centreY);
-        m.off[i] = mirrorOff(lens, z, zBack, depths[at], std::abs(dot(octDecode(normals[at]), toEye)), depths[next]);
-        passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (m.off[i] < kMirrorFarOff ? 0.0f : 1.0f);
+        const vec3 n = octDecode(normals[at]);
+        m.off[i] = mirrorOff(lens, z, zBack, depths[at], std::abs(dot(n, toEye)), depths[next]);
+        const float meets = mirrorMeets(m.off[i], n, vec3(m.rx[i], m.ry[i], m.rz[i])) ? 1.0f : 0.0f;
+        passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (1.0f - meets);
     }
     float any = 0.0f;
     for (size_t i = 0; i < count; ++i) any = max(any, passes[i]);
@@ -202,15 +205,17 @@ struct MetRow {
         row.placeY = y;
         for (uint32_t i = 0; i < n; ++i) row.material[i] = kPixelTriangle | kPixelUnlit;
     }
-    void take(const FrameConstants& f, const ReflectionInput& in, uint32_t i, const MirrorTap& tap) {
+    /// Gives the share that it counts, if only as nothing.
+    float take(const FrameConstants& f, const ReflectionInput& in, uint32_t i, const MirrorTap& tap, vec3 direction) {
         const size_t at = size_t(uint32_t(tap.y)) * f.width + uint32_t(tap.x);
         const bool isThere = in.depth[at] > 0.0f;
-        share[i] = isThere ? tap.share : 0.0f;
+        const vec3 n = octDecode(in.normal[at]);
+        const bool isAway = isThere && dot(n, direction) >= 0.0f;
+        share[i] = isThere && !isAway ? tap.share : 0.0f;
         x[i] = float(tap.x) + 0.5f - f.centre.x;
         y[i] = float(tap.y) + 0.5f - f.centre.y;
         row.depth[i] = isThere ? in.depth[at] : 0.0f;
         row.material[i] = isThere ? in.material[at] : kPixelTriangle | kPixelUnlit;
-        const vec3 n = octDecode(in.normal[at]);
         row.nx[i] = n.x;
         row.ny[i] = n.y;
         row.nz[i] = n.z;
@@ -219,6 +224,7 @@ struct MetRow {
         row.blue[i] = unpackBlue(in.colour[at]);
         row.leaf[i] = (row.material[i] & kPixelLeaf) != 0u ? 1.0f : 0.0f;
         if (row.hasEmission) row.emission[i] = (row.material[i] & kPixelTriangle) != 0u ? in.emissive[at] : 0u;
+        return isAway ? 0.0f : tap.share;
     }
 };
 
@@ -282,13 +288,15 @@ bool reflectRow(const FrameConstants& frame, const ReflectionInput& in, uint32_t
         m.farR[i] = around.x;
         m.farG[i] = around.y;
         m.farB[i] = around.z;
-        m.metR[i] = m.metG[i] = m.metB[i] = 0.0f;
+        m.metR[i] = m.metG[i] = m.metB[i] = m.counted[i] = 0.0f;
     }
     const vec2 size(float(int(f.width)), float(int(f.height)));
     thread_local MetRow met;
     for (uint32_t tap = 0; tap < 4; ++tap) {
         met.clear(in, n);
-        for (size_t i = 0; i < count; ++i) met.take(f, in, m.at[i], mirrorTap(size, m.hitX[i], m.hitY[i], tap));
+        for (size_t i = 0; i < count; ++i)
+            m.counted[i] +=
+                met.take(f, in, m.at[i], mirrorTap(size, m.hitX[i], m.hitY[i], tap), vec3(m.rx[i], m.ry[i], m.rz[i]));
         if (in.shadows.slots > 0) shadowRow(f, in.shadows, x0, y, n, met.row);
         lightRow(f, in.light, x0, y, n, met.row);
         for (size_t i = 0; i < count; ++i) {
@@ -301,7 +309,8 @@ bool reflectRow(const FrameConstants& frame, const ReflectionInput& in, uint32_t
     for (size_t i = 0; i < n; ++i) out.red[i] = out.green[i] = out.blue[i] = 0.0f;
     for (size_t i = 0; i < count; ++i) {
         const Surface s = mirrorOf(in, lens, m, i, first + m.at[i], py);
-        const vec3 added = mirrorAdded(s, vec3(m.share[i] * m.metR[i], m.share[i] * m.metG[i], m.share[i] * m.metB[i]));
+        const float share = m.share[i] / max(m.counted[i], kMirrorCounted);
+        const vec3 added = mirrorAdded(s, vec3(share * m.metR[i], share * m.metG[i], share * m.metB[i]));
         out.red[m.at[i]] = added.x;
         out.green[m.at[i]] = added.y;
         out.blue[m.at[i]] = added.z;

@@ -12,21 +12,29 @@ float depthAt(float x, float y) {
     const vec2 size = pictureSize();
     return surfaceBuffer[entryAt(mirrorPixel(x, size.x), mirrorPixel(y, size.y))].depth;
 }
+vec3 normalAt(float x, float y) {
+    const vec2 size = pictureSize();
+    return octDecode(surfaceBuffer[entryAt(mirrorPixel(x, size.x), mirrorPixel(y, size.y))].normal);
+}
 vec3 placeAt(float x, float y, float depth) {
     return alongRay(pixelRay(frameLensHere(), (x - frame.centre.x) / frame.focal, (y - frame.centre.y) / frame.focal), depth);
 }
 
 // What four pixels about a place send, less what would be seen without them.
-vec3 lightMet(float x, float y, vec3 surroundings) {
+vec3 lightMet(float x, float y, vec3 direction, vec3 surroundings) {
     vec3 sum = vec3(0.0);
+    float counted = 0.0;
     for (uint k = 0u; k < 4u; ++k) {
         const MirrorTap tap = mirrorTap(pictureSize(), x, y, k);
         const SurfaceWords s = surfaceBuffer[entryAt(tap.x, tap.y)];
+        const vec3 n = octDecode(s.normal);
+        if (s.depth > 0.0 && dot(n, direction) >= 0.0) continue;
+        counted += tap.share;
         if (!(s.depth > 0.0)) continue;
         const vec3 colour = vec3(unpackRed(s.albedo), unpackGreen(s.albedo), unpackBlue(s.albedo));
-        sum += tap.share * (litColour(s, colour, octDecode(s.normal), uvec2(tap.x, tap.y)) - surroundings);
+        sum += tap.share * (litColour(s, colour, n, uvec2(tap.x, tap.y)) - surroundings);
     }
-    return sum;
+    return sum / max(counted, kMirrorCounted);
 }
 
 // How far behind what is seen there the ray is at a share of its way.
@@ -54,7 +62,7 @@ float offAt(MirrorRay m, float share) {
     const int column = mirrorPixel(m.x + share * m.dx, size.x), line = mirrorPixel(m.y + share * m.dy, size.y);
     const SurfaceWords s = surfaceBuffer[entryAt(column, line)];
     const vec3 toEye = -normalize(rayDirection(pixelRayHere(uvec2(column, line))));
-    const float on = share + m.onePixel;
+    const float on = share + kMirrorAhead * m.onePixel;
     return mirrorOff(lens, mirrorDepth(lens, m.linear, m.dLinear, share),
                      mirrorDepth(lens, m.linear, m.dLinear, share - m.onePixel), s.depth, abs(dot(octDecode(s.normal), toEye)),
                      depthAt(m.x + on * m.dx, m.y + on * m.dy));
@@ -86,19 +94,17 @@ vec3 mirrored(uvec2 pixel) {
         if (isInFront && isBehind) {
             high = narrowed(m, k);
             off = offAt(m, high);
-            isFound = off < kMirrorFarOff;
+            isFound = mirrorMeets(off, normalAt(m.x + high * m.dx, m.y + high * m.dy), m.direction);
             ++tries;
         }
         isInFront = !isBehind;
     }
     if (!isFound) return vec3(0.0);
     const float x = m.x + high * m.dx, y = m.y + high * m.dy, z = mirrorDepth(lens, m.linear, m.dLinear, high);
-    const vec2 size = pictureSize();
-    const vec3 n = octDecode(surfaceBuffer[entryAt(mirrorPixel(x, size.x), mirrorPixel(y, size.y))].normal);
     const float share = m.share * mirrorPassed(float(int(tries) - 1)) *
-                        mirrorHit(reflection, size, m.direction, n, x, y, off, distance(placeAt(x, y, z), place));
+                        mirrorHit(reflection, pictureSize(), m.direction, normalAt(x, y), x, y, off, distance(placeAt(x, y, z), place));
     if (!(share > 0.0)) return vec3(0.0);
-    return mirrorAdded(s, share * lightMet(x, y, mirrorSurroundings(frame, s, m.direction)));
+    return mirrorAdded(s, share * lightMet(x, y, m.direction, mirrorSurroundings(frame, s, m.direction)));
 }
 
 void main() {

@@ -3,8 +3,9 @@
 // The mirror ray of a pixel is followed across the picture in even steps, its depth by what is linear there (lens.h),
 // until it is behind what a pixel shows and was in front of the picture a step before; halvings of that step find the
 // place. Met is what the ray is no farther from than depths change there in a pixel; where it is farther behind (twice
-// that) it passes, and goes on. (Of grazing ground one pixel is far behind the next, of what faces the eye it is not:
-// how long a step is would not tell.)
+// that) it passes, and goes on, as it does where that shows another side than the ray meets (its own surface, a pixel
+// on). (Of grazing ground one pixel is far behind the next, of what faces the eye it is not: how long a step is would
+// not tell.)
 //
 //        eye ------> o surface          from o on: in front, in front, behind: between those two it is met
 //                     \_ . _ . _ x
@@ -101,16 +102,21 @@ SHARED_FN int mirrorPixel(float at, float size) { return int(min(max(0.0f, at), 
 SHARED_FN float mirrorBehind(float z, float depth) { return depth > 0.0f ? z - depth : -1.0f; }
 // How far a ray is from the surface that it went behind, in shares of what it may be where it meets that. `z`: of the
 // ray (`zBefore`: one pixel before); `depth`, `facing`: of the pixel where it is behind, its normal's cosine to the
-// eye; `next`: the depth of the picture one pixel on. From a pixel to the next depths go as they go from this one to
-// the one before it, but no steeper than the normal says: of ground that is exact, of a rim, which lets rays behind,
-// much less than its normal has it. (Where nothing is next, it is far.)
+// eye; `next`: the depth of the picture kMirrorAhead on. Into this pixel depths go as they go on from it, but no
+// steeper than the normal says: of ground that is exact, of a rim, which lets rays behind, much less than its normal
+// has it. (Where nothing is next, it is far.)
+const float kMirrorAhead = 2.0f;  // px: of one, a slanted ray may stay in its row
 SHARED_FN float mirrorOff(Lens lens, float z, float zBefore, float depth, float facing, float next) {
     const float pixel = lensDepth(lens, depth) / lens.focal;
     const float steepest = sqrt(max(1.0f - facing * facing, 0.0f)) / max(facing, kMirrorGrazing) * pixel;
-    const float into = 0.5f * (next > 0.0f ? min(max(depth - next, -steepest), steepest) : -steepest);
+    const float into = 0.5f * (next > 0.0f ? min(max((depth - next) / kMirrorAhead, -steepest), steepest) : -steepest);
     return abs(z - depth - into) / (abs(z - zBefore) + pixel + abs(into));
 }
 const float kMirrorFarOff = 2.0f;  // from there on it passes
+// Does a ray of that direction meet a surface with the normal n there?
+SHARED_FN bool mirrorMeets(float off, vec3 n, vec3 direction) {
+    return off < kMirrorFarOff && dot(n, direction) < 0.0f;
+}
 // How much counts what is met behind so many things that the ray has passed: at the fourth it is not followed on, and
 // that must not come at once.
 SHARED_FN float mirrorPassed(float things) { return clampedShare((float(int(kMirrorTries)) - things) / 3.0f); }
@@ -125,7 +131,9 @@ SHARED_FN float mirrorHit(ReflectionConstants c, vec2 size, vec3 direction, vec3
            clampedShare(4.0f - 4.0f * distance / c.reach);
 }
 
-// The four pixels about a place, number `tap` of them, and its share.
+// The four pixels about a place, number `tap` of them, and its share. Those that turn their back to the ray do not
+// count (at the foot of a ball it is the ball itself); the one that is met does.
+const float kMirrorCounted = 0.25f;  // which has so much at least
 struct MirrorTap {
     int x;
     int y;

@@ -61,11 +61,11 @@ END
 shot background-off house.glb --environment dusk.hdr
 shot background-on house.glb --environment dusk.hdr --background environment
 shot background-wide scan.las --up z --mode ewa --shade lit --environment dusk.hdr --background environment --fov 90
-balls="--eye 0,4,40 --target 0,3.2,24 --environment dusk.hdr --effects none"
-shot background-glass-off balls/demo.glb $balls
-shot background-glass balls/demo.glb $balls --background environment
+balls="--eye 0,4,40 --target 0,3.2,24 --environment dusk.hdr"
+shot background-glass-off balls/demo.glb $balls --effects none
+shot background-glass balls/demo.glb $balls --effects background --background environment
 smooth="--eye 2,4,36 --target 6,3,23"
-shot reflection-off balls/demo.glb $smooth --effects shadow
-shot reflection-on balls/demo.glb $smooth --effects shadow,reflection
+shot reflection-off balls/demo.glb $smooth --environment dusk.hdr --effects shadow
+shot reflection-on balls/demo.glb $smooth --environment dusk.hdr --effects shadow,reflection
 shot opacity-scan scan.las --up z --opacity 0.5
 shot opacity-house house.glb --opacity 0.4

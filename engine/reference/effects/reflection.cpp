@@ -49,7 +49,7 @@ class MirrorImages {
         if (!met) return dvec3(0);
         const double share = own * shareOf(*met, mirror, place);
         const dvec3 around = double(draws_.frame.ambient) * surroundingsOf(mirror, n, s.roughness, draws_);
-        return s.occlusion * share * mirrorShareOf(s, facing) * lightAbout(met->at, around);
+        return s.occlusion * share * mirrorShareOf(s, facing) * lightAbout(met->at, mirror, around);
     }
 
   private:
@@ -104,13 +104,13 @@ class MirrorImages {
     double offWall(const Ray& r, double share, const dvec2& low) const {
         const double depth = depthOf(int(low.x), int(low.y)), z = std::max(depthAlong(r, share), depth);
         const dvec2 on =
-            glm::clamp(glm::floor(r.from + (share + 1 / r.pixels + 1e-9) * (r.to - r.from)), dvec2(0), size_ - 1.0);
+            glm::clamp(glm::floor(r.from + (share + 2 / r.pixels + 1e-9) * (r.to - r.from)), dvec2(0), size_ - 1.0);
         const double facing = std::abs(glm::dot(normalAt(*level_.at(int(low.x), int(low.y)), low + 0.5, view_),
                                                 sightOf(view_, viewRay(view_, low + 0.5).at(depth))));
         const double pixel = 1 / pixelsAt(view_, depth), tangent = std::sqrt(std::max(1 - facing * facing, 0.0));
         const double steepest = tangent / std::max(facing, 1.0 / 16) * pixel;
         const double next = depthOf(int(on.x), int(on.y));
-        const double into = (next > 0 ? std::clamp(depth - next, -steepest, steepest) : -steepest) / 2;
+        const double into = (next > 0 ? std::clamp((depth - next) / 2, -steepest, steepest) : -steepest) / 2;
         return std::abs(z - (depth + into)) /
                (std::abs(z - depthAlong(r, share - 1 / r.pixels)) + pixel + std::abs(into));
     }
@@ -137,7 +137,9 @@ class MirrorImages {
             if (wall > 0 && isInFront && std::max(entry, exit) > wall) {
                 const double at = entry > wall ? share : std::clamp(shareAtDepth(r, wall), share, end);
                 const double off = offWall(r, at, low);
-                if (off < 2) return Met{r.from + at * way, low, std::max(entry, wall), off, passed};
+                const dvec3 n = normalAt(*level_.at(int(low.x), int(low.y)), low + 0.5, view_);
+                if (off < 2 && glm::dot(n, mirror) < 0)
+                    return Met{r.from + at * way, low, std::max(entry, wall), off, passed};
                 ++passed;
             }
             isInFront = !(wall > 0 && exit > wall);
@@ -156,20 +158,25 @@ class MirrorImages {
                faded(inside / border) * faded(4 - 4 * distance / reach_);
     }
 
-    /// Bilinear, of what the four pixels about a place send; nothing of those that show nothing.
-    dvec3 lightAbout(const dvec2& at, const dvec3& around) const {
+    /// Bilinear, of what the four pixels about a place send; nothing of those that show nothing, and as if those that
+    /// turn their back to the ray were not there.
+    dvec3 lightAbout(const dvec2& at, const dvec3& mirror, const dvec3& around) const {
         const dvec2 p = glm::clamp(at - 0.5, dvec2(0), size_ - 1.0), low = glm::floor(p);
         dvec3 sum(0);
+        double counted = 0;
         for (const dvec2& corner : {dvec2(0, 0), dvec2(1, 0), dvec2(0, 1), dvec2(1, 1)}) {
             const dvec2 to = glm::min(low + corner, size_ - 1.0), near = 1.0 - glm::abs(low + corner - p);
             const Sample& s = *level_.at(int(to.x), int(to.y));
             const double depth = depthOf(int(to.x), int(to.y));
+            const dvec3 n = depth > 0 ? normalAt(s, to + 0.5, view_) : -mirror;
+            if (glm::dot(n, mirror) >= 0) continue;
+            counted += near.x * near.y;
             if (!(depth > 0)) continue;
-            const dvec3 light = sentBy(s, normalAt(s, to + 0.5, view_), viewRay(view_, to + 0.5).at(depth), draws_,
-                                       (draws_.frame.shade & shared::kShadeLit) != 0);
+            const dvec3 light =
+                sentBy(s, n, viewRay(view_, to + 0.5).at(depth), draws_, (draws_.frame.shade & shared::kShadeLit) != 0);
             sum += near.x * near.y * (light - around);
         }
-        return sum;
+        return sum / std::max(counted, 0.25);
     }
 
     const render::DrawList& draws_;
