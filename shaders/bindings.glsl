@@ -6,6 +6,7 @@
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 #include "shared/bindings.h"
 #include "shared/frame.h"
 #include "shared/material.h"
@@ -20,7 +21,10 @@ layout(set = 0, binding = kFrameBinding, scalar) readonly buffer FrameBlock { Fr
 layout(set = 0, binding = kNodesBinding, scalar) readonly buffer NodeBlock { DrawNode nodes[]; };
 layout(set = 0, binding = kBlocksBinding, scalar) readonly buffer BlockBlock { DrawBlock blocks[]; };
 layout(set = 0, binding = kVisibilityBinding, scalar) buffer VisibilityBlock { uint64_t visibility[]; };
-layout(set = 0, binding = kTexelsBinding, scalar) buffer TexelBlock { uint texels[]; };
+#ifndef TEXELS
+#define TEXELS  // coherent: a workgroup reads what others of its threads have written
+#endif
+layout(set = 0, binding = kTexelsBinding, scalar) TEXELS buffer TexelBlock { uint texels[]; };
 layout(set = 0, binding = kStatsBinding, scalar) buffer StatsBlock { uint largestRadiusBits; };
 layout(set = 0, binding = kImageBinding, scalar) writeonly buffer ImageBlock { uint image[]; };
 layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
@@ -30,6 +34,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Rec
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Segments { CurveSegment segments[]; };
 
 layout(push_constant, scalar) uniform StepBlock { Step stepInfo; };
+
+// Offers a key to a pixel. Most lose, and need no atomic operation to: keys only fall, so that one that was read too early
+// is larger, and hides nothing.
+void offerKey(uint at, uint64_t key) {
+    if (key < visibility[at]) atomicMin(visibility[at], key);
+}
 
 Lens frameLensHere() { return lensOf(frame.focal, frame.orthographic != 0u); }
 // The ray through a pixel's centre.
@@ -43,6 +53,13 @@ uint materialOf(DrawNode node, uint record) {
     const uint first = 4u * node.materials + (node.weights + 3u) / 4u;
     const uint pair = RecordWords(uvec2(node.addressLow, node.addressHigh)).words[first + record / 2u];
     return (record & 1u) != 0u ? pair >> 16 : pair & 0xffffu;
+}
+
+// Millions of pixels have one largest splat: a subgroup asks once for all of its own, and only where it would rise (what
+// is read may be old, and then is smaller).
+void takeLargest(float radius) {
+    const uint largest = subgroupMax(floatBitsToUint(radius));
+    if (subgroupElect() && largest > largestRadiusBits) atomicMax(largestRadiusBits, largest);
 }
 
 // Levels whose texels are larger than the largest splat hold nothing; the resolve pass has measured it.
@@ -117,21 +134,38 @@ void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {
     if (frame.hasMaterials != 0u) texels[at + 5u * plane] = packSurface(t.surface);
 }
 
-Texel pushedTexel(ivec2 pixel, Texel own) {
+// A level of the pyramid: where its words begin, how many texels it has each way.
+struct PyramidLevel {
+    uint offset, width, height;
+};
+// Of level `level`, from `coarse`, the next one.
+Texel pushedFrom(PyramidLevel coarse, uint level, ivec2 pixel, Texel own) {
     const Lens lens = frameLensHere();
     const ivec2 parent = pixel >> 1;
     const ivec2 side = (pixel & 1) * 2 - 1;
-    const float fineSize = exp2(float(stepInfo.level));
+    const float fineSize = exp2(float(level));
     const float coarseSize = 2.0 * fineSize;
     const vec2 at = (vec2(pixel) + 0.5) * fineSize - frame.centre;  // px from the principal point
     const vec2 near = (vec2(parent) + 0.5) * coarseSize - frame.centre;
     const vec2 far = near + vec2(side) * coarseSize;
-    const Texel q0 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x, parent.y);
-    const Texel q1 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x + side.x, parent.y);
-    const Texel q2 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x, parent.y + side.y);
-    const Texel q3 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x + side.x, parent.y + side.y);
+    const Texel q0 = loadTexel(coarse.offset, coarse.width, coarse.height, parent.x, parent.y);
+    const Texel q1 = loadTexel(coarse.offset, coarse.width, coarse.height, parent.x + side.x, parent.y);
+    const Texel q2 = loadTexel(coarse.offset, coarse.width, coarse.height, parent.x, parent.y + side.y);
+    const Texel q3 = loadTexel(coarse.offset, coarse.width, coarse.height, parent.x + side.x, parent.y + side.y);
     return pushTexel(own, q0, q1, q2, q3, coarseDisc(q0, near.x, near.y, lens),
                      coarseDisc(q1, far.x, near.y, lens), coarseDisc(q2, near.x, far.y, lens),
                      coarseDisc(q3, far.x, far.y, lens), float(side.x), float(side.y), at.x, at.y, fineSize,
                      lens);
+}
+Texel pushedTexel(ivec2 pixel, Texel own) {
+    return pushedFrom(PyramidLevel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight), stepInfo.level, pixel, own);
+}
+// Of a level's texel, from the four of the next finer level, number `level`.
+Texel pulledFrom(PyramidLevel fine, uint level, ivec2 pixel) {
+    const ivec2 c = pixel * 2;
+    return pullTexels(loadTexel(fine.offset, fine.width, fine.height, c.x, c.y),
+                      loadTexel(fine.offset, fine.width, fine.height, c.x + 1, c.y),
+                      loadTexel(fine.offset, fine.width, fine.height, c.x, c.y + 1),
+                      loadTexel(fine.offset, fine.width, fine.height, c.x + 1, c.y + 1),
+                      exp2(float(level)), frameLensHere());
 }

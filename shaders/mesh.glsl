@@ -108,8 +108,27 @@ bool isKept(DrawCluster c, uint corners, uvec2 pixel) {
     return alpha >= material.alphaCutoff;
 }
 
-// Edge functions of an oriented triangle at a pixel's centre, in 64 bits: exact for every corner within the guard band.
+// Does it reach less than 64 pixels each way? Then 32 bits hold the products of its edge functions, within its box.
+bool isNarrow(LargeTriangle t) {
+    const int width = max(t.x0, max(t.x1, t.x2)) - min(t.x0, min(t.x1, t.x2));
+    const int height = max(t.y0, max(t.y1, t.y2)) - min(t.y0, min(t.y1, t.y2));
+    return max(width, height) < 64 * 256;
+}
+bool isCoveredNarrow(LargeTriangle t, int x, int y, out float inverseDepth) {
+    const int px = x * 256 + 128, py = y * 256 + 128;
+    const int w0 = (t.x2 - t.x1) * (py - t.y1) - (t.y2 - t.y1) * (px - t.x1);
+    const int w1 = (t.x0 - t.x2) * (py - t.y2) - (t.y0 - t.y2) * (px - t.x2);
+    const int w2 = (t.x1 - t.x0) * (py - t.y0) - (t.y1 - t.y0) * (px - t.x0);
+    const int area = (t.x1 - t.x0) * (t.y2 - t.y0) - (t.y1 - t.y0) * (t.x2 - t.x0);
+    inverseDepth = (float(w0) * t.inverseDepth0 + float(w1) * t.inverseDepth1 + float(w2) * t.inverseDepth2) / float(area);
+    return w0 >= (isTopLeft(t.x2 - t.x1, t.y2 - t.y1) ? 0 : 1) && w1 >= (isTopLeft(t.x0 - t.x2, t.y0 - t.y2) ? 0 : 1) &&
+           w2 >= (isTopLeft(t.x1 - t.x0, t.y1 - t.y0) ? 0 : 1);
+}
+
+// Edge functions of an oriented triangle at the centre of a pixel of its box; of a wide one in 64 bits: exact for every
+// corner within the guard band.
 bool isCovered(LargeTriangle t, int x, int y, out float inverseDepth) {
+    if (isNarrow(t)) return isCoveredNarrow(t, x, y, inverseDepth);
     const int64_t px = int64_t(x) * 256l + 128l;
     const int64_t py = int64_t(y) * 256l + 128l;
     const int64_t x0 = int64_t(t.x0), y0 = int64_t(t.y0), x1 = int64_t(t.x1), y1 = int64_t(t.y1), x2 = int64_t(t.x2), y2 = int64_t(t.y2);
@@ -126,5 +145,5 @@ bool isCovered(LargeTriangle t, int x, int y, out float inverseDepth) {
 
 // `linear`: imageLinear of the depth.
 void offer(int x, int y, float linear, uint64_t id) {
-    atomicMin(visibility[uint(y) * frame.width + uint(x)], visibilityKey(floatBitsToUint(depthOfLinear(frameLensHere(), linear)), id));
+    offerKey(uint(y) * frame.width + uint(x), visibilityKey(floatBitsToUint(depthOfLinear(frameLensHere(), linear)), id));
 }

@@ -91,6 +91,6 @@ void offerSplat(PatchSplat s, int x, int y) {
     else
         depth = patchTriangleDepth(ray, s.a, s.b, s.c, frame.nearPlane);
     if (depth >= kNoPatch) return;
-    atomicMin(visibility[uint(y) * frame.width + uint(x)],
-              visibilityKey(floatBitsToUint(depth), drawId(frame.firstBlock.of[kKindPatches], s.id)));
+    offerKey(uint(y) * frame.width + uint(x),
+             visibilityKey(floatBitsToUint(depth), drawId(frame.firstBlock.of[kKindPatches], s.id)));
 }

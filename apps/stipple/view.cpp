@@ -22,6 +22,7 @@
 #include "engine/gpu/gpu_backend.h"
 #include "engine/image/image_io.h"
 #include "engine/render/accumulation.h"
+#include "engine/scene/open/cache_folder.h"
 #include "engine/scene/open/mesh_files.h"
 #include "engine/scene/open/scene_facts.h"
 
@@ -418,7 +419,7 @@ Result<Stage> setStage(const ViewOptions& o, const std::string& title, const glm
     auto window = gpu::Window::create(settings);
     if (window && isGpu) {
         stage.window = std::move(*window);
-        auto backend = gpu::makeGpuBackendOn(stage.window->device());
+        auto backend = gpu::makeGpuBackendOn(stage.window->device(), scene::CacheFolder::path());
         stage.isShared = backend.has_value();
         if (!backend && o.device == "auto") backend = makeBackend("cpu", executor);
         if (!backend) return tl::unexpected<Error>(backend.error());

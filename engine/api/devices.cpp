@@ -6,6 +6,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/reference.h"
+#include "engine/scene/open/cache_folder.h"
 #ifdef STIPPLE_WITH_GPU
 #include "engine/gpu/gpu_backend.h"
 #endif
@@ -19,7 +20,9 @@ Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, 
     if (device == "auto") {
         // A real GPU if there is one; software Vulkan only when asked for.
         if (gpu::hasHardwareDevice()) {
-            auto backend = gpu::makeGpuBackend({});
+            gpu::GpuSettings settings;
+            settings.cacheFolder = scene::CacheFolder::path();
+            auto backend = gpu::makeGpuBackend(settings);
             if (backend) return backend;
         }
         return cpu::makeCpuBackend(executor);
@@ -28,6 +31,7 @@ Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, 
         gpu::GpuSettings settings;
         settings.deviceName = device.size() > 4 ? device.substr(4) : "";
         settings.validation = std::getenv("STIPPLE_VALIDATION") != nullptr;
+        settings.cacheFolder = scene::CacheFolder::path();
         return gpu::makeGpuBackend(settings);
     }
 #else

@@ -223,11 +223,16 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
                                 seen.empty() ? "none" : seen),
                     "--device", "stipple --version lists them");
 
+    VkPhysicalDeviceSubgroupProperties subgroups{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
     VkPhysicalDeviceMaintenance4Properties sizes{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES};
+    sizes.pNext = &subgroups;
     VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
     properties.pNext = &sizes;
     vkGetPhysicalDeviceProperties2(d->physical, &properties);
     d->limits = {properties.properties.limits.maxStorageBufferRange, sizes.maxBufferSize};
+    if ((subgroups.supportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT) == 0)
+        return fail(ErrorKind::device, "lacks a feature that Stipple needs (arithmetic of subgroups)", d->deviceName,
+                    "try --device cpu");
 
     uint32_t families = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(d->physical, &families, nullptr);
@@ -261,13 +266,12 @@ std::vector<std::string> Device::messages() const {
     return messages_->texts;
 }
 
-Result<uint32_t> Device::memoryType(uint32_t bits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags fallback) const {
+std::optional<uint32_t> Device::memoryType(uint32_t bits, VkMemoryPropertyFlags wanted) const {
     VkPhysicalDeviceMemoryProperties memory{};
     vkGetPhysicalDeviceMemoryProperties(physical, &memory);
-    for (const VkMemoryPropertyFlags flags : {wanted, fallback})
-        for (uint32_t i = 0; i < memory.memoryTypeCount; ++i)
-            if ((bits >> i & 1u) != 0 && (memory.memoryTypes[i].propertyFlags & flags) == flags) return i;
-    return fail(ErrorKind::device, "has no memory of the kind that is needed", deviceName, "try --device cpu");
+    for (uint32_t i = 0; i < memory.memoryTypeCount; ++i)
+        if ((bits >> i & 1u) != 0 && (memory.memoryTypes[i].propertyFlags & wanted) == wanted) return i;
+    return {};
 }
 
 void Device::setName(VkObjectType type, uint64_t handle, const std::string& name) const {
@@ -279,7 +283,41 @@ void Device::setName(VkObjectType type, uint64_t handle, const std::string& name
     setName_(device, &info);
 }
 
-Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible,
+namespace {
+
+/// What to ask of memory, the best first.
+std::span<const VkMemoryPropertyFlags> wishesFor(Memory memory) {
+    constexpr VkMemoryPropertyFlags kDevice = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT,
+                                    kHost = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT,
+                                    kCached = kHost | VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
+    static constexpr std::array kOfDevice{kDevice, VkMemoryPropertyFlags{0}}, kOfTables{kHost | kDevice, kHost},
+        kOfHost{kCached, kHost};
+    return memory == Memory::device ? kOfDevice : memory == Memory::table ? kOfTables : kOfHost;
+}
+
+/// Of the best kind that there is room in: what the host reaches of the device's memory may be little.
+Result<VkDeviceMemory> allocate(const Device& d, const VkMemoryRequirements& needs, Memory memory, bool isAddressed,
+                                const std::string& name) {
+    VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO};
+    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+    VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
+    info.pNext = isAddressed ? &flags : nullptr;
+    info.allocationSize = needs.size;
+    VkResult last = VK_ERROR_FEATURE_NOT_PRESENT;
+    for (const VkMemoryPropertyFlags wish : wishesFor(memory)) {
+        const std::optional<uint32_t> type = d.memoryType(needs.memoryTypeBits, wish);
+        if (!type) continue;
+        info.memoryTypeIndex = *type;
+        VkDeviceMemory made = VK_NULL_HANDLE;
+        last = vkAllocateMemory(d.device, &info, nullptr, &made);
+        if (last == VK_SUCCESS) return made;
+    }
+    return vulkanError(last, fmt::format("no memory for {} ({} bytes)", name, needs.size));
+}
+
+}  // namespace
+
+Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlags usage, Memory memory,
                               const std::string& name) {
     Buffer b;
     b.device_ = d.device;
@@ -291,26 +329,13 @@ Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlag
         return vulkanError(r, "no buffer " + name);
     VkMemoryRequirements needs{};
     vkGetBufferMemoryRequirements(d.device, b.buffer_, &needs);
-    const VkMemoryPropertyFlags host = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-    STIPPLE_ASSIGN(const uint32_t type,
-                   d.memoryType(needs.memoryTypeBits,
-                                hostVisible ? host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT
-                                            : VkMemoryPropertyFlags{VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT},
-                                hostVisible ? host : VkMemoryPropertyFlags{0}));
-    VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO};
-    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
-    const bool addressed = (usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
-    VkMemoryAllocateInfo allocate{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
-    allocate.pNext = addressed ? &flags : nullptr;
-    allocate.allocationSize = needs.size;
-    allocate.memoryTypeIndex = type;
-    if (const VkResult r = vkAllocateMemory(d.device, &allocate, nullptr, &b.memory_); r != VK_SUCCESS)
-        return vulkanError(r, fmt::format("no memory for {} ({} bytes)", name, bytes));
+    const bool isAddressed = (usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
+    STIPPLE_ASSIGN(b.memory_, allocate(d, needs, memory, isAddressed, name));
     if (const VkResult r = vkBindBufferMemory(d.device, b.buffer_, b.memory_, 0); r != VK_SUCCESS)
         return vulkanError(r, "cannot bind " + name);
-    if (hostVisible && vkMapMemory(d.device, b.memory_, 0, VK_WHOLE_SIZE, 0, &b.mapped_) != VK_SUCCESS)
+    if (memory != Memory::device && vkMapMemory(d.device, b.memory_, 0, VK_WHOLE_SIZE, 0, &b.mapped_) != VK_SUCCESS)
         return fail(ErrorKind::device, "cannot map " + name, d.deviceName);
-    if (addressed) {
+    if (isAddressed) {
         VkBufferDeviceAddressInfo address{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO};
         address.buffer = b.buffer_;
         b.address_ = vkGetBufferDeviceAddress(d.device, &address);

@@ -63,8 +63,8 @@ class Device {
     bool isSoftware = false;
 
     std::vector<std::string> messages() const;
-    /// Index of a memory type with these properties among `bits`, or of one with `fallback`.
-    Result<uint32_t> memoryType(uint32_t bits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags fallback) const;
+    /// Index of the first memory type with these properties among `bits`.
+    std::optional<uint32_t> memoryType(uint32_t bits, VkMemoryPropertyFlags wanted) const;
     void setName(VkObjectType type, uint64_t handle, const std::string& name) const;
 
   private:
@@ -91,11 +91,19 @@ VkBufferMemoryBarrier2 bufferBarrier(VkBuffer buffer, BufferTouch before, Buffer
 void recordBarriers(VkCommandBuffer commands, std::span<const VkBufferMemoryBarrier2> buffers,
                     const VkMemoryBarrier2* memory = nullptr);
 
+/// Where a buffer lies.
+enum class Memory : uint8_t {
+    device,  ///< the host never looks
+    table,   ///< the host writes it front to back, the device reads it often: in the device's own memory if the host
+             ///< reaches that, else in the host's
+    host,    ///< copies to and from it; quick to read for the host
+};
+
 class Buffer {
   public:
     Buffer() = default;
-    /// hostVisible: mapped for the buffer's life.
-    static Result<Buffer> create(const Device& device, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible,
+    /// Unless it is Memory::device it is mapped for the buffer's life.
+    static Result<Buffer> create(const Device& device, uint64_t bytes, VkBufferUsageFlags usage, Memory memory,
                                  const std::string& name);
     Buffer(Buffer&& o) noexcept { swap(o); }
     Buffer& operator=(Buffer&& o) noexcept {

@@ -32,13 +32,13 @@ bool listsDiscs(const render::RenderRequest& request) {
 }  // namespace
 
 /// Grows `buffer` to at least `bytes`; descriptors are written again where it changes.
-Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible,
+Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, Memory memory,
                                   const char* name) {
     bytes = std::max<uint64_t>(bytes, 256);
     if (buffer.bytes() >= bytes) return {};
     STIPPLE_ASSIGN(const uint64_t room, roomFor(device_.limits, bytes, usage, name, device_.deviceName));
     if (buffer.bytes() > 0) vkDeviceWaitIdle(device_.device);  // a window may still copy from it
-    STIPPLE_ASSIGN(buffer, Buffer::create(device_, room, usage, hostVisible, name));
+    STIPPLE_ASSIGN(buffer, Buffer::create(device_, room, usage, memory, name));
     descriptorsChanged_ = true;
     return {};
 }
@@ -61,10 +61,6 @@ Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const R
     return {};
 }
 
-Result<void> FrameBuffers::prepareStaging(uint64_t bytes) {
-    return ensure(staging_, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true, "staging");
-}
-
 /// Levels of the pyramid, and buffers that every frame needs.
 Result<void> FrameBuffers::preparePlanes(const render::RenderRequest& request) {
     const render::DrawList& draws = *request.draws;
@@ -83,44 +79,48 @@ Result<void> FrameBuffers::preparePlanes(const render::RenderRequest& request) {
     uint64_t nodes = 0;
     for (const render::DrawBatch& batch : draws.batches) nodes += batch.nodes.size();
     const uint64_t blocks = draws.frame.firstBlock.of[kKindDiscs];
-    STIPPLE_TRY(ensure(nothing_, 0, kConstants, false, "nothing"));
-    STIPPLE_TRY(ensure(bound_[kFrameBinding], sizeof(FrameConstants), kStorage, true, "frame constants"));
-    STIPPLE_TRY(ensure(bound_[kNodesBinding], gpu::bytesOf(kNodesBinding, nodes), kStorage, true, "draw nodes"));
-    STIPPLE_TRY(ensure(bound_[kBlocksBinding], gpu::bytesOf(kBlocksBinding, blocks), kStorage, true, "draw blocks"));
+    STIPPLE_TRY(ensure(nothing_, 0, kConstants, Memory::device, "nothing"));
+    STIPPLE_TRY(ensure(bound_[kFrameBinding], sizeof(FrameConstants), kStorage, Memory::table, "frame constants"));
     STIPPLE_TRY(
-        ensure(bound_[kVisibilityBinding], gpu::bytesOf(kVisibilityBinding, pixels), kFilled, false, "visibility"));
-    STIPPLE_TRY(ensure(bound_[kTexelsBinding], gpu::bytesOf(kTexelsBinding, words), kFilled, false, "texels"));
-    STIPPLE_TRY(ensure(bound_[kStatsBinding], 256, kFilled, false, "stats"));
+        ensure(bound_[kNodesBinding], gpu::bytesOf(kNodesBinding, nodes), kStorage, Memory::table, "draw nodes"));
     STIPPLE_TRY(
-        ensure(bound_[kSurfaceBinding], gpu::bytesOf(kSurfaceBinding, pixels), kStorage, false, "surface buffer"));
-    STIPPLE_TRY(ensure(bound_[kImageBinding], gpu::bytesOf(kImageBinding, pixels), kCopied, false, "image"));
-    STIPPLE_TRY(ensure(bound_[kExtraBinding], gpu::bytesOf(kExtraBinding, extra), kCopied, false, "depth and normals"));
+        ensure(bound_[kBlocksBinding], gpu::bytesOf(kBlocksBinding, blocks), kStorage, Memory::table, "draw blocks"));
+    STIPPLE_TRY(ensure(bound_[kVisibilityBinding], gpu::bytesOf(kVisibilityBinding, pixels), kFilled, Memory::device,
+                       "visibility"));
+    STIPPLE_TRY(ensure(bound_[kTexelsBinding], gpu::bytesOf(kTexelsBinding, words), kFilled, Memory::device, "texels"));
+    STIPPLE_TRY(ensure(bound_[kStatsBinding], 256, kFilled, Memory::device, "stats"));
+    STIPPLE_TRY(ensure(bound_[kSurfaceBinding], gpu::bytesOf(kSurfaceBinding, pixels), kStorage, Memory::device,
+                       "surface buffer"));
+    STIPPLE_TRY(ensure(bound_[kImageBinding], gpu::bytesOf(kImageBinding, pixels), kCopied, Memory::device, "image"));
+    STIPPLE_TRY(ensure(bound_[kExtraBinding], gpu::bytesOf(kExtraBinding, extra), kCopied, Memory::device,
+                       "depth and normals"));
     return ensure(readback_, gpu::bytesOf(kImageBinding, pixels) + gpu::bytesOf(kExtraBinding, extra),
-                  VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "readback");
+                  VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::host, "readback");
 }
 
 /// Of what covers many pixels.
 Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
     if (has(request, render::Pass::curves))
-        STIPPLE_TRY(
-            ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, false, "filled curves"));
+        STIPPLE_TRY(ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, Memory::device,
+                           "filled curves"));
     if (listsDiscs(request))
-        STIPPLE_TRY(
-            ensure(bound_[kDiscsBinding], gpu::bytesOf(kDiscsBinding, kDiscCapacity), kFilled, false, "wide discs"));
+        STIPPLE_TRY(ensure(bound_[kDiscsBinding], gpu::bytesOf(kDiscsBinding, kDiscCapacity), kFilled, Memory::device,
+                           "wide discs"));
     if (has(request, render::Pass::ewa)) {
         const uint64_t pixels = uint64_t{request.draws->frame.width} * request.draws->frame.height;
-        STIPPLE_TRY(ensure(bound_[kFrontsBinding], gpu::bytesOf(kFrontsBinding, pixels), kFilled, false, "fronts"));
-        STIPPLE_TRY(ensure(bound_[kSumsBinding], gpu::bytesOf(kSumsBinding, pixels), kStorage, false, "sums"));
         STIPPLE_TRY(
-            ensure(bound_[kFilteredBinding], gpu::bytesOf(kFilteredBinding, pixels), kStorage, false, "blended discs"));
-        STIPPLE_TRY(
-            ensure(bound_[kCoverageBinding], gpu::bytesOf(kCoverageBinding, pixels), kStorage, false, "coverage"));
+            ensure(bound_[kFrontsBinding], gpu::bytesOf(kFrontsBinding, pixels), kFilled, Memory::device, "fronts"));
+        STIPPLE_TRY(ensure(bound_[kSumsBinding], gpu::bytesOf(kSumsBinding, pixels), kStorage, Memory::device, "sums"));
+        STIPPLE_TRY(ensure(bound_[kFilteredBinding], gpu::bytesOf(kFilteredBinding, pixels), kStorage, Memory::device,
+                           "blended discs"));
+        STIPPLE_TRY(ensure(bound_[kCoverageBinding], gpu::bytesOf(kCoverageBinding, pixels), kStorage, Memory::device,
+                           "coverage"));
         STIPPLE_TRY(ensure(bound_[kSecondGroupsBinding], gpu::bytesOf(kSecondGroupsBinding, kGroupShapes),
-                           kFilled | kCopied | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, false,
+                           kFilled | kCopied | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, Memory::device,
                            "groups of second surfaces"));
         if (request.draws->frame.hasMaterials != 0)
             STIPPLE_TRY(ensure(bound_[kMaterialSumsBinding], gpu::bytesOf(kMaterialSumsBinding, pixels), kStorage,
-                               false, "material sums"));
+                               Memory::device, "material sums"));
     }
     return {};
 }
@@ -155,7 +155,7 @@ void FrameBuffers::fillDraws(const render::DrawList& draws, const Residents& res
 template <typename T>
 Result<void> FrameBuffers::fill(uint32_t binding, const T* data, size_t count, const char* name) {
     Buffer& buffer = bound_.at(binding);
-    STIPPLE_TRY(ensure(buffer, gpu::bytesOf(binding, count), kStorage, true, name));
+    STIPPLE_TRY(ensure(buffer, gpu::bytesOf(binding, count), kStorage, Memory::table, name));
     if (count > 0) std::memcpy(buffer.mapped(), data, count * sizeof(T));
     return {};
 }
@@ -181,7 +181,7 @@ Result<void> FrameBuffers::prepareBackdrop(const std::shared_ptr<const render::B
 Result<void> FrameBuffers::prepareShadows(const render::DrawList& draws) {
     if (!draws.isShadowed) return {};
     STIPPLE_ASSIGN(const ShadowTable table, shadows_.prepare(device_, draws));
-    STIPPLE_TRY(ensure(bound_[kShadowBinding], sizeof(table), kConstants, true, "shadow maps"));
+    STIPPLE_TRY(ensure(bound_[kShadowBinding], sizeof(table), kConstants, Memory::table, "shadow maps"));
     std::memcpy(bound_[kShadowBinding].mapped(), &table, sizeof(table));
     return {};
 }
@@ -198,7 +198,7 @@ Result<void> FrameBuffers::prepareLayer(const render::LayerTables& layer) {
 Result<void> FrameBuffers::prepareEffects(const render::DrawList& draws) {
     for (const render::EffectTable& table : draws.tables) {
         Buffer& buffer = bound_.at(table.binding);
-        STIPPLE_TRY(ensure(buffer, table.bytes.size(), isUniform(table.binding) ? kConstants : kStorage, true,
+        STIPPLE_TRY(ensure(buffer, table.bytes.size(), isUniform(table.binding) ? kConstants : kStorage, Memory::table,
                            "table of an effect"));
         std::memcpy(buffer.mapped(), table.bytes.data(), table.bytes.size());
     }
@@ -207,7 +207,7 @@ Result<void> FrameBuffers::prepareEffects(const render::DrawList& draws) {
         const render::Effect& effect = *render::effects()[e];
         for (const render::EffectPlane& plane : effect.planes)
             STIPPLE_TRY(ensure(bound_.at(plane.binding), gpu::bytesOf(plane.binding, plane.elements(draws)), kFilled,
-                               false, effect.name));
+                               Memory::device, effect.name));
     }
     return {};
 }
@@ -246,8 +246,8 @@ Result<void> FrameBuffers::prepareMeshes(const render::DrawList& draws, const Re
     STIPPLE_TRY(fill(kTilesBinding, meshFrame_.tiles.data(), meshFrame_.tiles.size(), "texture tiles"));
     const uint64_t pixels = uint64_t{draws.frame.width} * draws.frame.height;
     STIPPLE_TRY(ensure(bound_[kTriangleWordsBinding], gpu::bytesOf(kTriangleWordsBinding, pixels * kTriangleWords),
-                       kStorage, false, "triangle pixels"));
-    return ensure(bound_[kLargeBinding], gpu::bytesOf(kLargeBinding, kLargeCapacity), kFilled, false,
+                       kStorage, Memory::device, "triangle pixels"));
+    return ensure(bound_[kLargeBinding], gpu::bytesOf(kLargeBinding, kLargeCapacity), kFilled, Memory::device,
                   "large triangles");
 }
 

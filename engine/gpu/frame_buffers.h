@@ -33,14 +33,11 @@ class FrameBuffers {
 
     /// All that the frame's passes read from the host, and room for what they write; not while the device uses them.
     Result<void> prepare(const render::RenderRequest& request, const Residents& residents);
-    /// For `bytes` of chunks on their way to the device.
-    Result<void> prepareStaging(uint64_t bytes);
 
     const Buffer& at(uint32_t binding) const { return bound_.at(binding); }
     /// What a shader finds there: where no frame has called for it, a few bytes that nobody asks for.
     const Buffer& bound(uint32_t binding) const { return at(binding).bytes() > 0 ? at(binding) : nothing_; }
     const Buffer& readback() const { return readback_; }
-    const Buffer& staging() const { return staging_; }
     const std::vector<Level>& levels() const { return levels_; }
     /// Offset in words, in frames with Pass::smooth: that of what pixels show, while the levels are of smooth discs.
     uint32_t texelsOfPixels() const { return texelsOfPixels_; }
@@ -52,7 +49,7 @@ class FrameBuffers {
     uint64_t bytesOf(const render::Effect& effect) const;
 
   private:
-    Result<void> ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const char* name);
+    Result<void> ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, Memory memory, const char* name);
     Result<void> preparePlanes(const render::RenderRequest& request);
     Result<void> prepareLists(const render::RenderRequest& request);
     Result<void> prepareMeshes(const render::DrawList& draws, const Residents& residents);
@@ -72,7 +69,7 @@ class FrameBuffers {
     std::array<Buffer, shared::kBindings> bound_;
     std::shared_ptr<const render::Environment> environment_;  ///< that is in its buffer
     std::shared_ptr<const render::Backdrop> backdrop_;        ///< likewise
-    Buffer readback_, staging_, nothing_;
+    Buffer readback_, nothing_;
     std::vector<Level> levels_;
     uint32_t texelsOfPixels_ = 0;
     MeshFrame meshFrame_;

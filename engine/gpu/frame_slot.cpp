@@ -46,20 +46,21 @@ Result<void> FrameSlot::createCommandObjects() {
     return {};
 }
 
-Result<void> FrameSlot::submit(const render::RenderRequest& request, const Residents& residents,
-                               std::vector<PendingUpload>& uploads, uint64_t number) {
+Result<void> FrameSlot::submit(const render::RenderRequest& request, const Residents& residents, Staging& uploads,
+                               uint64_t number) {
     hasPicture_ = false;
     STIPPLE_TRY(buffers_.prepare(request, residents));
     STIPPLE_TRY(record(request, uploads));
     STIPPLE_TRY(submitCommands(device_, commands_, fence_));
-    uploads.clear();
+    uploads_.clear();
+    std::swap(uploads, uploads_);
     isInFlight_ = true;
     hasPicture_ = true;
     number_ = number;
     return {};
 }
 
-Result<void> FrameSlot::record(const render::RenderRequest& request, std::vector<PendingUpload>& uploads) {
+Result<void> FrameSlot::record(const render::RenderRequest& request, const Staging& uploads) {
     VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
     info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS)
@@ -70,32 +71,16 @@ Result<void> FrameSlot::record(const render::RenderRequest& request, std::vector
     wantsAll_ = request.wantDepthAndNormal;
     if (staysOnDevice_) list.wasCopied(buffers_.at(kImageBinding).handle());  // a window may be about it still
     staysOnDevice_ = request.staysOnDevice;
-    if (!uploads.empty()) STIPPLE_TRY(recordUploads(list, uploads));
+    if (!uploads.isEmpty()) {
+        list.beginUpload();
+        uploads.recordCopies(commands_);
+        list.end();
+    }
     STIPPLE_TRY(Recording(list, pipelines_, commands_, buffers_, request).recordPasses());
     if (!staysOnDevice_) recordReadback(list);
     if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS)
         return vulkanError(r, "cannot end recording");
     labels_ = list.names();
-    return {};
-}
-
-Result<void> FrameSlot::recordUploads(PassList& list, std::vector<PendingUpload>& uploads) {
-    uint64_t bytes = 0;
-    for (const PendingUpload& p : uploads) bytes += p.chunk.sizeBytes();
-    STIPPLE_TRY(buffers_.prepareStaging(bytes));
-    list.beginUpload();
-    uint64_t at = 0;
-    for (const PendingUpload& p : uploads) {
-        const uint64_t begin = at;
-        p.chunk.forEachArray([&](const auto& array) {
-            const size_t size = array.size() * sizeof(array[0]);
-            if (size > 0) std::memcpy(static_cast<char*>(buffers_.staging().mapped()) + at, array.data(), size);
-            at += size;
-        });
-        const VkBufferCopy region{begin, p.offset, at - begin};
-        vkCmdCopyBuffer(commands_, buffers_.staging().handle(), p.page, 1, &region);
-    }
-    list.end();
     return {};
 }
 

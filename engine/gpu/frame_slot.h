@@ -6,15 +6,9 @@
 
 #include "engine/gpu/frame_buffers.h"
 #include "engine/gpu/record.h"
+#include "engine/gpu/staging.h"
 
 namespace stipple::gpu {
-
-/// A copy of a chunk's arrays into a page, before a frame's passes.
-struct PendingUpload {
-    VkBuffer page;
-    uint64_t offset;
-    lod::Chunk chunk;
-};
 
 class FrameSlot {
   public:
@@ -23,9 +17,9 @@ class FrameSlot {
     FrameSlot(const FrameSlot&) = delete;
     FrameSlot& operator=(const FrameSlot&) = delete;
 
-    /// Records and sends a frame; not while one is in flight. `uploads` are emptied.
-    Result<void> submit(const render::RenderRequest& request, const Residents& residents,
-                        std::vector<PendingUpload>& uploads, uint64_t number);
+    /// Records and sends a frame; not while one is in flight. It takes `uploads`, and leaves an empty one.
+    Result<void> submit(const render::RenderRequest& request, const Residents& residents, Staging& uploads,
+                        uint64_t number);
     /// Has the device finished it?
     bool isDone() const;
     Result<void> wait();
@@ -43,10 +37,9 @@ class FrameSlot {
 
   private:
     FrameSlot(const Device& device, Pipelines& pipelines, VkDescriptorSet set)
-        : device_(device), pipelines_(pipelines), set_(set), buffers_(device, set) {}
+        : device_(device), pipelines_(pipelines), set_(set), buffers_(device, set), uploads_(device) {}
     Result<void> createCommandObjects();
-    Result<void> record(const render::RenderRequest& request, std::vector<PendingUpload>& uploads);
-    Result<void> recordUploads(PassList& list, std::vector<PendingUpload>& uploads);
+    Result<void> record(const render::RenderRequest& request, const Staging& uploads);
     void recordReadback(PassList& list);
     void takeTimes(std::vector<render::PassTime>& times) const;
     void takeImage(render::Image& image) const;
@@ -55,6 +48,7 @@ class FrameSlot {
     Pipelines& pipelines_;
     VkDescriptorSet set_;
     FrameBuffers buffers_;
+    Staging uploads_;  ///< that the frame in flight copies
     VkCommandPool commandPool_ = VK_NULL_HANDLE;
     VkCommandBuffer commands_ = VK_NULL_HANDLE;
     VkFence fence_ = VK_NULL_HANDLE;

@@ -6,6 +6,7 @@
 
 #include "engine/gpu/frame_slot.h"
 #include "engine/gpu/pages.h"
+#include "engine/gpu/staging.h"
 #include "engine/render/chunk_table.h"
 
 namespace stipple::gpu {
@@ -20,9 +21,10 @@ struct Resident {
 
 class GpuBackend final : public render::Backend {
   public:
-    static Result<std::unique_ptr<render::Backend>> create(std::shared_ptr<Device> device) {
+    static Result<std::unique_ptr<render::Backend>> create(std::shared_ptr<Device> device,
+                                                           const std::string& cacheFolder) {
         std::unique_ptr<GpuBackend> b(new GpuBackend(std::move(device)));
-        STIPPLE_ASSIGN(b->pipelines_, Pipelines::create(*b->device_));
+        STIPPLE_ASSIGN(b->pipelines_, Pipelines::create(*b->device_, cacheFolder));
         STIPPLE_TRY(b->addSlot());
         return b;
     }
@@ -61,20 +63,21 @@ class GpuBackend final : public render::Backend {
 
     Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
         STIPPLE_ASSIGN(const PageStore::Place place, pages_.allocate(chunk.sizeBytes()));
+        if (const auto added = uploads_.add(chunk, pages_.buffer(place), place.offset); !added) {
+            pages_.release(place);
+            return added;
+        }
         Resident& resident = residents_.add(key);
         resident.place = place;
         const VkDeviceAddress address = pages_.address(place);
         resident.mesh = {address, address + chunk.vertices.size() * sizeof(shared::MeshVertex),
                          std::move(chunk.clusters)};
         lod::planesOfPatches(chunk.patchBlocks, chunk.patchPlanes, resident.planes);
-        pending_.push_back({pages_.buffer(place), place.offset, std::move(chunk)});
         return {};
     }
     void evict(streaming::ChunkKey key) override {
         residents_.drop(key, [&](const Resident& resident) {
-            std::erase_if(pending_, [&](const PendingUpload& p) {
-                return p.page == pages_.buffer(resident.place) && p.offset == resident.place.offset;
-            });
+            uploads_.drop(pages_.buffer(resident.place), resident.place.offset);
             pages_.release(resident.place);
         });
     }
@@ -90,7 +93,7 @@ class GpuBackend final : public render::Backend {
                 const Resident* const found = residents_.find({source, chunk});
                 return found == nullptr ? 0 : pages_.address(found->place);
             }};
-        STIPPLE_TRY(slot->submit(request, residents, pending_, submitted_ + 1));
+        STIPPLE_TRY(slot->submit(request, residents, uploads_, submitted_ + 1));
         return render::Ticket{++submitted_};
     }
     bool isDone(render::Ticket ticket) const override {
@@ -120,7 +123,8 @@ class GpuBackend final : public render::Backend {
     }
 
   private:
-    explicit GpuBackend(std::shared_ptr<Device> device) : device_(std::move(device)), pages_(*device_) {}
+    explicit GpuBackend(std::shared_ptr<Device> device)
+        : device_(std::move(device)), pages_(*device_), uploads_(*device_) {}
 
     Result<FrameSlot*> addSlot() {
         STIPPLE_ASSIGN(auto slot, FrameSlot::create(*device_, *pipelines_));
@@ -147,7 +151,7 @@ class GpuBackend final : public render::Backend {
     std::unique_ptr<Pipelines> pipelines_;
     PageStore pages_;
     render::ChunkTable<Resident> residents_;
-    std::vector<PendingUpload> pending_;
+    Staging uploads_;  ///< since the last frame
     std::vector<std::unique_ptr<FrameSlot>> slots_;
     std::vector<render::PassTime> times_;
     uint64_t submitted_ = 0;
@@ -157,11 +161,12 @@ class GpuBackend final : public render::Backend {
 
 Result<std::unique_ptr<render::Backend>> makeGpuBackend(const GpuSettings& settings) {
     STIPPLE_ASSIGN(std::shared_ptr<Device> device, Device::create({settings.deviceName, settings.validation, {}, {}}));
-    return GpuBackend::create(std::move(device));
+    return GpuBackend::create(std::move(device), settings.cacheFolder);
 }
 
-Result<std::unique_ptr<render::Backend>> makeGpuBackendOn(std::shared_ptr<Device> device) {
-    return GpuBackend::create(std::move(device));
+Result<std::unique_ptr<render::Backend>> makeGpuBackendOn(std::shared_ptr<Device> device,
+                                                          const std::string& cacheFolder) {
+    return GpuBackend::create(std::move(device), cacheFolder);
 }
 
 std::optional<DevicePicture> pictureOf(const render::Backend& backend, render::Ticket ticket) {

@@ -14,11 +14,13 @@ namespace stipple::gpu {
 struct GpuSettings {
     std::string deviceName;   ///< part of a name; empty: the first device
     bool validation = false;  ///< core and synchronization validation; messages are kept
+    std::string cacheFolder;  ///< where what the driver compiles is kept for the next run; empty: nowhere
 };
 
 Result<std::unique_ptr<render::Backend>> makeGpuBackend(const GpuSettings& settings);
 /// On a device that others use as well: a window that shows what it draws.
-Result<std::unique_ptr<render::Backend>> makeGpuBackendOn(std::shared_ptr<Device> device);
+Result<std::unique_ptr<render::Backend>> makeGpuBackendOn(std::shared_ptr<Device> device,
+                                                          const std::string& cacheFolder = {});
 
 /// A frame that stays on its device (RenderRequest::staysOnDevice): rows of pixels as in render::Image, written by
 /// compute shaders. Valid until the second frame after it is handed in.

@@ -50,7 +50,7 @@ Result<PageStore::Place> PageStore::allocate(uint64_t bytes) {
     STIPPLE_ASSIGN(Buffer buffer, Buffer::create(device_, size,
                                                  VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                                                      VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
-                                                 false, "records page"));
+                                                 Memory::device, "records page"));
     pages_.push_back({std::move(buffer), RangeAllocator(size)});
     return Place{static_cast<uint32_t>(pages_.size() - 1), pages_.back().ranges.allocate(bytes), bytes};
 }

@@ -8,8 +8,9 @@
 
 namespace stipple::gpu {
 
-Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device) {
+Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device, const std::string& cacheFolder) {
     std::unique_ptr<Pipelines> p(new Pipelines(device));
+    STIPPLE_ASSIGN(p->cache_, PipelineCache::create(device, cacheFolder));
     std::array<VkDescriptorSetLayoutBinding, shared::kBindings> bindings{};
     for (uint32_t i = 0; i < shared::kBindings; ++i)
         bindings.at(i) = {i, descriptorType(i), 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
@@ -65,7 +66,7 @@ Result<void> Pipelines::add(const Shader& shader) {
     info.stage.pName = "main";
     info.layout = layout_;
     VkPipeline pipeline = VK_NULL_HANDLE;
-    const VkResult r = vkCreateComputePipelines(device_.device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+    const VkResult r = vkCreateComputePipelines(device_.device, cache_->handle(), 1, &info, nullptr, &pipeline);
     vkDestroyShaderModule(device_.device, module, nullptr);
     if (r != VK_SUCCESS) return vulkanError(r, "no pipeline " + name);
     device_.setName(VK_OBJECT_TYPE_PIPELINE, reinterpret_cast<uint64_t>(pipeline), name);

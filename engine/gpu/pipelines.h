@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/gpu/device.h"
+#include "engine/gpu/pipeline_cache.h"
 #include "engine/gpu/shader_table.h"
 #include "engine/render/effects/table.h"
 
@@ -33,7 +34,8 @@ constexpr uint32_t countUniform() {
 
 class Pipelines {
   public:
-    static Result<std::unique_ptr<Pipelines>> create(const Device& device);
+    /// `cacheFolder`: where what the driver compiles is kept; empty: nowhere.
+    static Result<std::unique_ptr<Pipelines>> create(const Device& device, const std::string& cacheFolder);
     ~Pipelines();
     Pipelines(const Pipelines&) = delete;
     Pipelines& operator=(const Pipelines&) = delete;
@@ -54,6 +56,7 @@ class Pipelines {
     explicit Pipelines(const Device& device) : device_(device) {}
     Result<void> add(const Shader& shader);
     const Device& device_;
+    std::unique_ptr<PipelineCache> cache_;
     VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
     VkDescriptorPool pool_ = VK_NULL_HANDLE;

@@ -132,8 +132,8 @@ void Recording::overBands(const std::string& label, const std::string& name, uin
     dispatch(label, known(name), step, groupsOfBands());
 }
 
-void Recording::once(const std::string& label, const std::string& name) {
-    dispatch(label, known(name), stepAt(0), {shared::kOverBlocks, 1, 1});
+void Recording::once(const std::string& label, const std::string& name, size_t level) {
+    dispatch(label, known(name), stepAt(level), {shared::kOverBlocks, 1, 1});
 }
 
 void Recording::emptyList(const std::string& label, uint32_t binding) {

@@ -38,8 +38,8 @@ class Recording {
     void overBlocks(const std::string& shader, size_t blocks);
     /// Groups for bands of rows: what covers many pixels is shared out. `firstBlock`: of the ids that are drawn.
     void overBands(const std::string& label, const std::string& shader, uint32_t firstBlock = 0);
-    /// One group.
-    void once(const std::string& label, const std::string& shader);
+    /// One group; the step is from `level` to the next.
+    void once(const std::string& label, const std::string& shader, size_t level = 0);
     /// A list of what covers many pixels begins with its length.
     void emptyList(const std::string& label, uint32_t binding);
     /// Counts of groups begin with as many as there are of blocks, bands and pixels, and none of them on (GroupCounts).

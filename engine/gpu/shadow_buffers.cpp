@@ -13,7 +13,7 @@ Result<Buffer> bufferOf(const Device& device, const std::vector<T>& values, cons
     constexpr VkBufferUsageFlags kRead = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
     const uint64_t bytes = values.size() * sizeof(T);
     STIPPLE_ASSIGN(const uint64_t room, roomFor(device.limits, bytes, kRead, name, device.deviceName));
-    STIPPLE_ASSIGN(Buffer buffer, Buffer::create(device, room, kRead, true, name));
+    STIPPLE_ASSIGN(Buffer buffer, Buffer::create(device, room, kRead, Memory::table, name));
     std::memcpy(buffer.mapped(), values.data(), bytes);
     return buffer;
 }

@@ -149,8 +149,10 @@ Result<void> Swapchain::createCanvas(uint32_t width, uint32_t height) {
     if (const VkResult r = vkCreateFramebuffer(device_.device, &frame, nullptr, &framebuffer_); r != VK_SUCCESS)
         return vulkanError(r, "no framebuffer");
     const uint64_t bytes = uint64_t{width} * height * 4;
-    STIPPLE_ASSIGN(staging_, Buffer::create(device_, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true, "window staging"));
-    STIPPLE_ASSIGN(readback_, Buffer::create(device_, bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "screenshot"));
+    STIPPLE_ASSIGN(staging_,
+                   Buffer::create(device_, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Memory::host, "window staging"));
+    STIPPLE_ASSIGN(readback_,
+                   Buffer::create(device_, bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::host, "screenshot"));
     canvasWidth_ = width;
     canvasHeight_ = height;
     return {};

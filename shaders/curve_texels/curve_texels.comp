@@ -42,6 +42,6 @@ void main() {
     t.colour = a.xyz + place * (b.xyz - a.xyz);
     if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(node.level);
     if (frame.debugView == kDebugError) t.colour = debugErrorColour(node.errorPixels);
-    atomicMax(largestRadiusBits, floatBitsToUint(t.radius));
+    takeLargest(t.radius);
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
 }

@@ -21,7 +21,7 @@ void main() {
             const ivec2 at = ivec2(x.first + p % width, y.x + p / width);
             const vec2 ray = (vec2(at) + 0.5 - frame.centre) * inverseFocal;
             const float depth = discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth;
-            if (depth < kNoDisc) atomicMin(visibility[uint(at.y) * frame.width + uint(at.x)], visibilityKey(floatBitsToUint(depth), drawId(stepInfo.firstBlock, d.id)));
+            if (depth < kNoDisc) offerKey(uint(at.y) * frame.width + uint(at.x), visibilityKey(floatBitsToUint(depth), drawId(stepInfo.firstBlock, d.id)));
         }
     }
 }

@@ -9,7 +9,7 @@ const int kMostPixels = 1024;
 
 void offer(ivec2 pixel, WideDisc d) {
     const float depth = depthAtPixel(d, pixel);
-    if (depth < kNoDisc) atomicMin(visibility[uint(pixel.y) * frame.width + uint(pixel.x)], visibilityKey(floatBitsToUint(depth), drawId(0u, d.id)));
+    if (depth < kNoDisc) offerKey(uint(pixel.y) * frame.width + uint(pixel.x), visibilityKey(floatBitsToUint(depth), drawId(0u, d.id)));
 }
 
 void main() {

@@ -45,6 +45,6 @@ void main() {
         key = c.z + s.farther * radius / scale;
     }
     if (isOneSided && !(dot(nodeNormal(node, octDirection(r.normal)), sight) < 0.0)) return;
-    const uint64_t id = drawId(block, gl_LocalInvocationID.x);
-    atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], visibilityKey(floatBitsToUint(key), id));
+    const uint at = uint(p.y) * frame.width + uint(p.x);
+    offerKey(at, visibilityKey(floatBitsToUint(key), drawId(block, gl_LocalInvocationID.x)));
 }

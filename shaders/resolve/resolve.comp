@@ -6,7 +6,7 @@
 #include "../shared/splat_size.h"
 #include "../shared/splat_disc.h"
 layout(set = 0, binding = kFilteredBinding, scalar) readonly buffer FilteredBlock { FilteredPixel filtered[]; };
-layout(local_size_x = 64) in;
+layout(local_size_x = 8, local_size_y = 8) in;
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -57,7 +57,7 @@ void main() {
         t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));
         t.colour = pointColour(node, r);
         t.surface = surface;
-        atomicMax(largestRadiusBits, floatBitsToUint(t.radius));
+        takeLargest(t.radius);
     }
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
 }

@@ -10,7 +10,7 @@ layout(local_size_x = 256) in;
 const int kMostPixels = 1024;
 
 void offer(int x, int y, float depth, uint id) {
-    atomicMin(visibility[uint(y) * frame.width + uint(x)], visibilityKey(floatBitsToUint(depth), drawId(0u, id)));
+    offerKey(uint(y) * frame.width + uint(x), visibilityKey(floatBitsToUint(depth), drawId(0u, id)));
 }
 
 // The disc of a lane of this block; radius -1: it is not drawn.

@@ -331,7 +331,7 @@ TEST(Validation, ADeliberateHazardIsReported) {
         auto made = Device::create({"", true, {}, {}});
         EXPECT_TRUE(made) << made.error().line();
         const Device& device = **made;
-        auto buffer = Buffer::create(device, 4096, VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "filled twice");
+        auto buffer = Buffer::create(device, 4096, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::device, "filled twice");
         EXPECT_TRUE(buffer);
         OneTimeCommands commands(device);
         VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};

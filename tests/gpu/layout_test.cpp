@@ -123,8 +123,8 @@ TEST(SharedStructs, EveryFieldComesBackFromTheGpu) {
     ASSERT_TRUE(made) << made.error().line();
     const Device& device = **made;
     const size_t words = sizeof(Shared) / 4;
-    auto in = Buffer::create(device, sizeof(Shared), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, true, "in");
-    auto out = Buffer::create(device, 4096, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, true, "out");
+    auto in = Buffer::create(device, sizeof(Shared), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, Memory::host, "in");
+    auto out = Buffer::create(device, 4096, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, Memory::host, "out");
     ASSERT_TRUE(in && out);
     for (uint32_t i = 0; i < words; ++i) {
         const uint32_t value = 0x3f000000u + 257 * i;  // a normal float, different for every field

@@ -15,7 +15,7 @@ namespace {
 std::vector<uint32_t> copied(const DevicePicture& picture) {
     const Device& device = *picture.device;
     const uint64_t bytes = uint64_t{picture.width} * picture.height * 4;
-    auto host = Buffer::create(device, bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "copy");
+    auto host = Buffer::create(device, bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::host, "copy");
     EXPECT_TRUE(host);
     OneTimeCommands commands(device);
     const auto drawn =

@@ -17,7 +17,7 @@ using Counts = std::array<shared::GroupCounts, shared::kGroupShapes>;
 
 Counts copied(const DeviceCounts& from) {
     Counts counts{};
-    auto host = Buffer::create(*from.device, sizeof counts, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "copy");
+    auto host = Buffer::create(*from.device, sizeof counts, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::host, "copy");
     EXPECT_TRUE(host);
     OneTimeCommands commands(*from.device);
     const auto counted =

@@ -12,13 +12,27 @@ constinit const GpuPass resolvePass{[](Recording& f) {
     });
 }};
 
+namespace {
+
+/// From this level on one workgroup pulls and pushes: dispatches for so few texels take longer than their work.
+size_t firstOfTail(const std::vector<Level>& levels) {
+    constexpr uint32_t kFewTexels = 4096;
+    size_t level = 0;
+    while (levels[level].width * levels[level].height > kFewTexels) ++level;
+    return level;
+}
+
+}  // namespace
+
 constinit const GpuPass pullPass{[](Recording& f) {
-    for (size_t l = 0; l + 1 < f.buffers().levels().size(); ++l) f.overPixels("pull", "pull", l, l + 1);
+    const size_t tail = firstOfTail(f.buffers().levels());
+    for (size_t l = 0; l < tail; ++l) f.overPixels("pull", "pull", l, l + 1);
+    f.once("pull", "pull_tail", tail);
 }};
 
-/// Down to level 1: the last push fills the surface buffer.
+/// Down to level 1, but for what the tail has pushed: the last push fills the surface buffer.
 constinit const GpuPass pushPass{[](Recording& f) {
-    for (size_t l = f.buffers().levels().size() - 1; l-- > 1;) f.overPixels("push", "push", l, l);
+    for (size_t l = firstOfTail(f.buffers().levels()); l-- > 1;) f.overPixels("push", "push", l, l);
 }};
 
 }  // namespace stipple::gpu

@@ -1,0 +1,46 @@
+#include "engine/gpu/staging.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace stipple::gpu {
+
+Result<void> Staging::ensure(uint64_t bytes) {
+    if (bytes <= buffer_.bytes()) return {};
+    constexpr VkBufferUsageFlags kUsage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+    STIPPLE_ASSIGN(const uint64_t room, roomFor(device_->limits, bytes, kUsage, "staging", device_->deviceName));
+    // At least twice as much as before, so that what lies there is moved seldom.
+    const uint64_t wanted = std::max({room, 2 * buffer_.bytes(), uint64_t{1} << 20});
+    STIPPLE_ASSIGN(Buffer larger,
+                   Buffer::create(*device_, std::min(wanted, device_->limits.buffer), kUsage, Memory::host, "staging"));
+    if (used_ > 0) std::memcpy(larger.mapped(), buffer_.mapped(), used_);
+    buffer_ = std::move(larger);
+    return {};
+}
+
+Result<void> Staging::add(const lod::Chunk& chunk, VkBuffer page, uint64_t offset) {
+    STIPPLE_TRY(ensure(used_ + chunk.sizeBytes()));
+    const uint64_t begin = used_;
+    chunk.forEachArray([&](const auto& array) {
+        const size_t size = array.size() * sizeof(array[0]);
+        if (size > 0) std::memcpy(static_cast<char*>(buffer_.mapped()) + used_, array.data(), size);
+        used_ += size;
+    });
+    if (used_ > begin) copies_.push_back({page, {begin, offset, used_ - begin}});
+    return {};
+}
+
+void Staging::drop(VkBuffer page, uint64_t offset) {
+    std::erase_if(copies_, [&](const Copy& c) { return c.page == page && c.region.dstOffset == offset; });
+}
+
+void Staging::recordCopies(VkCommandBuffer commands) const {
+    for (const Copy& c : copies_) vkCmdCopyBuffer(commands, buffer_.handle(), c.page, 1, &c.region);
+}
+
+void Staging::clear() {
+    copies_.clear();
+    used_ = 0;
+}
+
+}  // namespace stipple::gpu
