@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -16,7 +17,6 @@
 #include <sstream>
 
 #include "engine/gpu/gpu_backend.h"
-#include "engine/image/image_io.h"
 #include "engine/render/frame_passes.h"
 #include "shaders/shared/surface.h"
 
@@ -222,7 +222,10 @@ int run(int argc, char** argv) {
         request.staysOnDevice = false;
         render::Image image;
         valueOf(backend->render(request, image));
-        valueOf(image::writeImage(o.picture + name + ".png", image));
+        std::ofstream file(o.picture + name + ".ppm", std::ios::binary);
+        file << fmt::format("P6 {} {} 255\n", image.width, image.height);
+        for (const uint32_t pixel : image.rgba)
+            for (const uint32_t shift : {0u, 8u, 16u}) file.put(static_cast<char>(pixel >> shift & 255u));
     }
     return 0;
 }
