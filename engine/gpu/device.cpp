@@ -295,9 +295,10 @@ std::span<const VkMemoryPropertyFlags> wishesFor(Memory memory) {
     return memory == Memory::device ? kOfDevice : memory == Memory::table ? kOfTables : kOfHost;
 }
 
-/// Of the best kind that there is room in: what the host reaches of the device's memory may be little.
-Result<VkDeviceMemory> allocate(const Device& d, const VkMemoryRequirements& needs, Memory memory, bool isAddressed,
-                                const std::string& name) {
+}  // namespace
+
+Result<VkDeviceMemory> allocateMemory(const Device& d, const VkMemoryRequirements& needs, Memory memory,
+                                      bool isAddressed, const std::string& name) {
     VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO};
     flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
     VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
@@ -315,8 +316,6 @@ Result<VkDeviceMemory> allocate(const Device& d, const VkMemoryRequirements& nee
     return vulkanError(last, fmt::format("no memory for {} ({} bytes)", name, needs.size));
 }
 
-}  // namespace
-
 Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlags usage, Memory memory,
                               const std::string& name) {
     Buffer b;
@@ -330,7 +329,7 @@ Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlag
     VkMemoryRequirements needs{};
     vkGetBufferMemoryRequirements(d.device, b.buffer_, &needs);
     const bool isAddressed = (usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
-    STIPPLE_ASSIGN(b.memory_, allocate(d, needs, memory, isAddressed, name));
+    STIPPLE_ASSIGN(b.memory_, allocateMemory(d, needs, memory, isAddressed, name));
     if (const VkResult r = vkBindBufferMemory(d.device, b.buffer_, b.memory_, 0); r != VK_SUCCESS)
         return vulkanError(r, "cannot bind " + name);
     if (memory != Memory::device && vkMapMemory(d.device, b.memory_, 0, VK_WHOLE_SIZE, 0, &b.mapped_) != VK_SUCCESS)

@@ -123,13 +123,7 @@ Result<void> Swapchain::createCanvas(uint32_t width, uint32_t height) {
         return vulkanError(r, "no canvas");
     VkMemoryRequirements needs{};
     vkGetImageMemoryRequirements(device_.device, canvas_, &needs);
-    STIPPLE_ASSIGN(const uint32_t type,
-                   device_.memoryType(needs.memoryTypeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0));
-    VkMemoryAllocateInfo allocate{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
-    allocate.allocationSize = needs.size;
-    allocate.memoryTypeIndex = type;
-    if (const VkResult r = vkAllocateMemory(device_.device, &allocate, nullptr, &canvasMemory_); r != VK_SUCCESS)
-        return vulkanError(r, "no memory for the canvas");
+    STIPPLE_ASSIGN(canvasMemory_, allocateMemory(device_, needs, Memory::device, false, "the canvas"));
     if (const VkResult r = vkBindImageMemory(device_.device, canvas_, canvasMemory_, 0); r != VK_SUCCESS)
         return vulkanError(r, "cannot bind the canvas");
     VkImageViewCreateInfo view{VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO};
