@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <filesystem>
 
+#include "engine/base/file.h"
 #include "engine/gpu/gpu_backend.h"
 #include "tests/support/support.h"
 
@@ -73,6 +75,49 @@ TEST(Device, A4KPictureIsDrawnOrRefusedAndValidationIsSilent) {
     const auto small = render::renderUntilComplete(*state, test::fitView(*store, 320, 240), render::FrameSettings{});
     EXPECT_TRUE(small) << small.error().line();
     for (const std::string& message : validationMessages(**backend)) ADD_FAILURE() << message;
+}
+
+/// What the driver compiles is kept; a file that is not whole is no file.
+TEST(Pipelines, AreKeptFromOneRunToTheNext) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::bumpySphere(2'000, 1));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    GpuSettings settings;
+    settings.validation = true;
+    settings.cacheFolder = folder / "cache";  // not there yet
+    const auto draw = [&] {
+        const auto backend = makeGpuBackend(settings);
+        EXPECT_TRUE(backend);
+        render::Image image = test::renderView(store, **backend, *executor, test::fitView(*store, 160, 120), {});
+        for (const std::string& message : validationMessages(**backend)) ADD_FAILURE() << message;
+        return image;
+    };
+    const auto files = [&] {
+        std::vector<std::string> found;
+        for (const auto& entry : std::filesystem::directory_iterator(settings.cacheFolder))
+            found.push_back(entry.path().string());
+        return found;
+    };
+    const render::Image first = draw();
+    ASSERT_EQ(files().size(), 1u);
+    const std::string file = files().front();
+    const auto whole = readWhole(file);
+    ASSERT_TRUE(whole);
+    ASSERT_GT(whole->size(), sizeof(uint64_t));
+    EXPECT_TRUE(draw().rgba == first.rgba);
+    EXPECT_EQ(*readWhole(file), *whole) << "nothing new was compiled";
+    std::vector<uint8_t> changed = *whole;
+    changed.back() ^= 1;
+    const std::vector<std::vector<uint8_t>> others{{}, {1, 2, 3}, {whole->begin(), whole->end() - 1}, changed};
+    for (const std::vector<uint8_t>& other : others) {
+        ASSERT_TRUE(writeWholeFile(file, other.data(), other.size()));
+        EXPECT_TRUE(draw().rgba == first.rgba);
+        EXPECT_NE(*readWhole(file), other) << "it was not written again";
+    }
+    // Where none can be written pictures are drawn all the same.
+    settings.cacheFolder = file + "/no folder";
+    EXPECT_TRUE(draw().rgba == first.rgba);
 }
 
 }  // namespace
