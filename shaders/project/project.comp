@@ -1,19 +1,13 @@
-// One workgroup per block of 256 draw ids: each record to its pixel, by 64-bit atomic minimum of (depth, draw id).
+// One workgroup per block of 256 draw ids, four a thread: each record to its pixel, by 64-bit atomic minimum of (depth,
+// draw id).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../discs.glsl"
 #include "../shared/splat_size.h"
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
+const uint kThreads = 64u;
 
-void main() {
-    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
-    if (block >= frame.firstBlock.of[kKindCurves]) return;
-    const DrawBlock source = blocks[block];
-    const DrawNode node = nodes[source.node];
-    if (stepInfo.onlySmooth != 0u && (node.octantMask & kNodeSmooth) == 0u) return;
-    const uint index = source.first + gl_LocalInvocationID.x;
-    if (index >= node.count) return;
-    const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[index];
+void project(DrawNode node, PointRecord r, uint block, uint lane) {
     const bool fine = recordErrorCode(r) <= node.errorCode || (node.octantMask >> recordOctant(r) & 1u) != 0u;
     if (!fine) return;
     const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
@@ -23,7 +17,7 @@ void main() {
     if (stepInfo.hasWideDiscs != 0u && (node.octantMask & kNodeWide) != 0u &&
         isWideDisc(recordFlags(r), c.z, node.edge * frame.supportScale * radiusFractionFast(recordRadiusCode(r)), wideRadius(frame.width, frame.height) / frame.focal, frame.nearPlane, lens) > 0.5) {
         if (isOneSided && !(dot(nodeNormal(node, octDirection(r.normal)), sight) < 0.0)) return;
-        const WideDisc d = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + gl_LocalInvocationID.x, lens);
+        const WideDisc d = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + lane, lens);
         if (reachesPicture(d, frame) < 0.5) return;
         const uint place = atomicAdd(discCount, 1u);
         if (place < kDiscCapacity) {
@@ -45,6 +39,16 @@ void main() {
         key = c.z + s.farther * radius / scale;
     }
     if (isOneSided && !(dot(nodeNormal(node, octDirection(r.normal)), sight) < 0.0)) return;
-    const uint at = uint(p.y) * frame.width + uint(p.x);
-    offerKey(at, visibilityKey(floatBitsToUint(key), drawId(block, gl_LocalInvocationID.x)));
+    offerKey(uint(p.y) * frame.width + uint(p.x), visibilityKey(floatBitsToUint(key), drawId(block, lane)));
+}
+
+void main() {
+    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
+    if (block >= frame.firstBlock.of[kKindCurves]) return;
+    const DrawBlock source = blocks[block];
+    const DrawNode node = nodes[source.node];
+    if (stepInfo.onlySmooth != 0u && (node.octantMask & kNodeSmooth) == 0u) return;
+    Records from = Records(uvec2(node.addressLow, node.addressHigh));
+    for (uint lane = gl_LocalInvocationID.x; lane < kRecordsPerBlock && source.first + lane < node.count; lane += kThreads)
+        project(node, from.records[source.first + lane], block, lane);
 }

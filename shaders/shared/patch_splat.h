@@ -12,19 +12,26 @@
 #include "patch.h"
 SHARED_BEGIN
 
+#ifdef __cplusplus
+#define SHARED_PRECISE  // kernels are compiled without fused multiplications
+#else
+#define SHARED_PRECISE precise
+#endif
+
 const float kNoPatch = 3.0e38f;  // in the place of a depth
 
-// Depth at which a ray meets a triangle; kNoPatch: nowhere, or nearer than that.
+// Depth at which a ray meets a triangle; kNoPatch: nowhere, or nearer than that. Products are rounded before they are
+// subtracted: fused, they would have other digits on the other side of an edge.
 SHARED_FN float patchTriangleDepth(PixelRay ray, vec3 a, vec3 b, vec3 c, float nearPlane) {
-    const float ax = a.x - ray.ox - ray.ex * a.z;
-    const float ay = a.y - ray.oy - ray.ey * a.z;
-    const float bx = b.x - ray.ox - ray.ex * b.z;
-    const float by = b.y - ray.oy - ray.ey * b.z;
-    const float cx = c.x - ray.ox - ray.ex * c.z;
-    const float cy = c.y - ray.oy - ray.ey * c.z;
-    const float wa = bx * cy - by * cx;
-    const float wb = cx * ay - cy * ax;
-    const float wc = ax * by - ay * bx;
+    SHARED_PRECISE const float ax = a.x - ray.ox - ray.ex * a.z;
+    SHARED_PRECISE const float ay = a.y - ray.oy - ray.ey * a.z;
+    SHARED_PRECISE const float bx = b.x - ray.ox - ray.ex * b.z;
+    SHARED_PRECISE const float by = b.y - ray.oy - ray.ey * b.z;
+    SHARED_PRECISE const float cx = c.x - ray.ox - ray.ex * c.z;
+    SHARED_PRECISE const float cy = c.y - ray.oy - ray.ey * c.z;
+    SHARED_PRECISE const float wa = bx * cy - by * cx;
+    SHARED_PRECISE const float wb = cx * ay - cy * ax;
+    SHARED_PRECISE const float wc = ax * by - ay * bx;
     const float sum = wa + wb + wc;
     const float least = min(wa, min(wb, wc));
     const float most = max(wa, max(wb, wc));
