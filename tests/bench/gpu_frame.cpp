@@ -143,10 +143,13 @@ double since(Clock::time_point begin) {
 nlohmann::json measure(render::Backend& backend, render::RenderRequest request, int frames) {
     std::map<std::string, std::vector<double>> passes;
     std::vector<double> alone, device;
-    for (int f = 0; f < frames + 3; ++f) {
+    // Buffers and pipelines are made, and clocks that rest are raised.
+    constexpr double kWarmUp = 500;  // ms
+    for (const Clock::time_point warm = Clock::now(); since(warm) < kWarmUp;)
+        valueOf(backend.finish(valueOf(backend.submit(request))));
+    for (int f = 0; f < frames; ++f) {
         const Clock::time_point begin = Clock::now();
         valueOf(backend.finish(valueOf(backend.submit(request))));
-        if (f < 3) continue;  // buffers and pipelines are made
         alone.push_back(since(begin));
         double sum = 0;
         for (const render::PassTime& t : backend.passTimes()) {
