@@ -1,12 +1,12 @@
-"""accuracy_tables.py STUDY... RESULTS: accuracy.md and its plots, of folders that `stipple study SCENE...` wrote."""
+"""accuracy_tables.py STUDY... RESULTS NAME: NAME.md and its plots, of folders that `stipple study SCENE...` wrote."""
 import json
 import os
 import shutil
 import sys
 
-*studies, results = sys.argv[1:]
+*studies, results, page = sys.argv[1:]
 all_of = [(folder, json.load(open(os.path.join(folder, "study.json")))) for folder in studies]
-plots = os.path.join(results, "accuracy")
+plots = os.path.join(results, page)
 shutil.rmtree(plots, ignore_errors=True)
 os.makedirs(plots)
 p = all_of[-1][1]["provenance"]
@@ -57,14 +57,14 @@ def all_told(rows):
 out.append("# What accuracy costs\n")
 plan = all_of[-1][1]["plan"]
 first = all_of[-1][1]["configurations"][0]
-asked = "".join(f"{name}='{os.environ[name]}' " for name in ("OPTIONS", "SCENES") if os.environ.get(name))
+asked = "".join(f"{name}='{os.environ[name]}' " for name in ("NAME", "OPTIONS", "SCENES") if os.environ.get(name))
 out.append(f"Made by `STIPPLE_DATA=DATA {asked}tests/bench/accuracy_figures.sh` (it runs `stipple study SCENE --quick`, here at {first['width']} x {first['height']}, {', '.join(f'{t:g}' for t in plan['targets_px'])} px asked for, {plan['blocks']} blocks of {plan['frames']} frames; one camera of")
 out.append("each of orbit, dolly, fly-through and grazing; dB, FLIP and silhouettes against the traced full detail; px: distance in space of")
 out.append("each drawn pixel from the nearest full-detail surface, by brute force). Milliseconds are medians with 95 % of bootstraps over blocks.")
 out.append("Pop: greatest change of a channel, of 255, at p99.9 where the cut is that of a camera 9 % farther away and the camera is not; most: of any pixel; faded: as pop, of means of 16 frames over which levels fade, at 160 x 90. Flicker: by how")
 out.append("much more a turn of a quarter of a pixel changes pixels than it changes the truth, of 255, mean.\n")
 out.append(f"Machine: {p['processor']}, {p['threads']} cores; load {load:.1f}; {p['date']}; {p['device']}; {p['compiler']}, {p['flags']}.\n")
-if load > 1:
+if load > p['threads']:  # (a study that was just before it has as many threads)
     out.append("**Others shared the machine** while this was measured. That touches times and nothing else: the columns ms and 95 %, the milliseconds of what a")
     out.append("step costs, and the seconds after starts and jumps. Frames of all modes and errors were drawn in turn, in blocks of another order each, so that ratios between")
     out.append("times hold where they are apart; as they stand, milliseconds are too high. Errors, records and bytes are the same on any machine, busy or not.\n")
@@ -115,7 +115,7 @@ def scene(study, d, i, name):
             continue
         target = f"{os.path.splitext(name)[0]}-{plot}.svg"
         shutil.copyfile(source, os.path.join(plots, target))
-        out.append(f"![{name}: {plot}](accuracy/{target})\n")
+        out.append(f"![{name}: {plot}]({page}/{target})\n")
     out.append("| mode | asked, px | ms | 95 % | px p99 | px most | dB | FLIP | IoU | holes | pop | most | faded | flicker | MB of the file |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for r in rows:
         e = r["errors"]
@@ -146,4 +146,4 @@ def scene(study, d, i, name):
 for folder, d in all_of:
     for i, s in enumerate(d["scenes"]):
         scene(folder, d, i, s["name"])
-open(os.path.join(results, "accuracy.md"), "w").write("\n".join(out) + "\n")
+open(os.path.join(results, page + ".md"), "w").write("\n".join(out) + "\n")
