@@ -1,11 +1,11 @@
-// One workgroup per block of 256 draw ids, four a thread: each record to its pixel, by 64-bit atomic minimum of (depth,
+// One workgroup per block of 256 draw ids, eight a thread: each record to its pixel, by 64-bit atomic minimum of (depth,
 // draw id).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../discs.glsl"
 #include "../shared/splat_size.h"
-layout(local_size_x = 64) in;
-const uint kThreads = 64u;
+layout(local_size_x = 32) in;
+const uint kThreads = 32u;
 
 void project(DrawNode node, PointRecord r, uint block, uint lane) {
     const bool fine = recordErrorCode(r) <= node.errorCode || (node.octantMask >> recordOctant(r) & 1u) != 0u;
