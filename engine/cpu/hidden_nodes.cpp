@@ -102,7 +102,7 @@ NodeReach reachOf(const shared::FrameConstants& f, const shared::DrawNode& node,
 }
 
 void HiddenNodes::Marks::clear(size_t nodes) {
-    constexpr size_t kBitsOfNode = 16;  // so that few are taken for others
+    constexpr size_t kBitsOfNode = 32;  // so that hardly any is taken for another
     words.assign(std::bit_ceil(std::max<size_t>(nodes * kBitsOfNode / 64, 1)), 0);
 }
 

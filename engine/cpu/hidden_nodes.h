@@ -51,12 +51,13 @@ class HiddenNodes {
     void reset() { counts_ = {}; }
 
   private:
-    struct Marks {  ///< of nodes by a hash: what is marked wrongly is only drawn later
+    struct Marks {  ///< of nodes by a hash, two bits of a word: what seems to be marked is only drawn later
         std::vector<uint64_t> words;
-        uint64_t& wordOf(uint64_t hash) { return words[(hash >> 6) & (words.size() - 1)]; }
+        uint64_t& wordOf(uint64_t hash) { return words[(hash >> 12) & (words.size() - 1)]; }
+        static uint64_t bitsOf(uint64_t hash) { return uint64_t{1} << (hash & 63) | uint64_t{1} << (hash >> 6 & 63); }
         void clear(size_t nodes);
-        void mark(uint64_t hash) { wordOf(hash) |= uint64_t{1} << (hash & 63); }
-        bool has(uint64_t hash) { return (wordOf(hash) >> (hash & 63) & 1) != 0; }
+        void mark(uint64_t hash) { wordOf(hash) |= bitsOf(hash); }
+        bool has(uint64_t hash) { return (~wordOf(hash) & bitsOf(hash)) == 0; }
     };
     void measure(Frame& frame);
     bool isBehind(const NodeReach& reach) const;
