@@ -33,6 +33,7 @@ constexpr std::array kOnlyOf{
     OnlyOf{"--aperture", isDrawn, kDrawn},      OnlyOf{"--shutter", isDrawn, kDrawn},
     OnlyOf{"--fade", isDrawn, kDrawn},          OnlyOf{"--debug", isDrawn, kDrawn},
     OnlyOf{"--patch-as", isDrawn, kDrawn},      OnlyOf{"--interpolate", isDrawn, kDrawn},
+    OnlyOf{"--hidden", isDrawn, kDrawn},
 };
 
 }  // namespace
@@ -72,6 +73,11 @@ void ModeOptions::addTo(CLI::App& sub, bool hasReference) {
                    "which jumps where they meet)")
         ->check(oneOf({"correct", "direct"}))
         ->capture_default_str();
+    sub.add_option("--hidden", hidden,
+                   "points behind others that hide all of their node: skip (the picture is the same, to the bit), or "
+                   "draw")
+        ->check(oneOf({"skip", "draw"}))
+        ->capture_default_str();
     sub.add_option(
            "--refract", refract,
            "what is seen through glass: environment (what is all around), screen (also what is behind it on the "
@@ -101,6 +107,7 @@ void ModeOptions::applyTo(render::FrameSettings& settings) const {
                             : refract == "screen" ? shared::kRefractScreen
                                                   : shared::kRefractEnvironment;
     settings.draw.opacity = static_cast<float>(opacity);
+    settings.mayHideNodes = hidden == "skip";
     settings.draw.perSurfel = normalise == "surfel";
     settings.draw.patchAs = patchAs == "samples"      ? lod::kPatchesAsSamples
                             : patchAs != "splats"     ? shared::kPatchStrips

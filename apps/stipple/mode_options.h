@@ -17,6 +17,7 @@ struct ModeOptions {
     std::string mode = render::reconstructions().front().name, normalise = "pixel";
     std::string patchAs = "auto", interpolate = "correct";
     std::string refract = "object";
+    std::string hidden = "skip";
     double opacity = 1;
     double lowPass = 0.5;  ///< variance of the pixel's Gaussian, px^2
     double kernel = 2;     ///< standard deviations

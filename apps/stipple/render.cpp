@@ -123,6 +123,8 @@ nlohmann::json countersJson(const FrameCounters& c) {
     return {{"nodes_visited", c.nodesVisited},
             {"nodes_culled", c.nodesCulled},
             {"nodes_missing", c.nodesMissing},
+            {"nodes_hidden", c.nodesHidden},
+            {"records_hidden", c.recordsHidden},
             {"records_tested", c.recordsTested},
             {"proxies", c.proxies},
             {"group_members", c.groupMembers},

@@ -10,6 +10,7 @@ struct FrameCounters {
     uint64_t recordsDrawn = 0, recordsTested = 0, trianglesDrawn = 0;
     uint64_t proxies = 0;                          ///< instances of which points were drawn
     uint64_t groupMembers = 0;                     ///< instances of instance groups that were looked at one by one
+    uint64_t nodesHidden = 0, recordsHidden = 0;   ///< of those drawn: left out, as they are behind others
     uint64_t nodesSwaying = 0;                     ///< moved by wind, by a tenth of a pixel at least
     uint64_t shadowMaps = 0, shadowMapsDrawn = 0;  ///< of lights that cast shadows; of those drawn in this frame
     uint64_t shadowLightsLeft = 0;                 ///< lights that would cast, beyond those that do

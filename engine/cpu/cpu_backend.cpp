@@ -65,6 +65,8 @@ class CpuBackend final : public render::DrawsAtOnce {
         return r;
     }
 
+    render::HiddenCounts hidden() const override { return frame_.hidden.counts(); }
+
   private:
     void draw(const render::RenderRequest& request, render::Image& image) override {
         frame_.draws = request.draws;
@@ -75,6 +77,8 @@ class CpuBackend final : public render::DrawsAtOnce {
         frame_.wantAll = request.wantDepthAndNormal;
         frame_.hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
+        frame_.mayHideNodes = request.mayHideNodes && !request.isOfCasters;
+        frame_.hidden.reset();
         frame_.mirrored = {};
         frame_.isSmoothing = false;  // whatever became of the frame before
         frame_.hasSmooth =

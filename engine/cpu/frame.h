@@ -10,6 +10,7 @@
 #include "engine/base/huge_buffer.h"
 #include "engine/base/queue.h"
 #include "engine/cpu/effect_room.h"
+#include "engine/cpu/hidden_nodes.h"
 #include "engine/cpu/kernels.h"
 #include "engine/cpu/pyramid.h"
 #include "engine/render/backend.h"
@@ -49,6 +50,7 @@ struct Frame {
     bool wantAll = false;
     bool hasPyramid = false;    ///< the levels above the first are of this frame: push runs
     bool wantsNormals = false;  ///< some pass reads the surface's
+    bool mayHideNodes = false;  ///< RenderRequest::mayHideNodes
     bool hasSmooth = false;     ///< pixels of wide discs take colours and normals from a pyramid of their own ...
     bool isSmoothing = false;   ///< ... which is being made: of nothing but those discs
 
@@ -66,6 +68,8 @@ struct Frame {
     std::vector<TextureSet> textureSets;
     /// Are there triangles or patches?
     bool hasTriangles = false, hasEmissive = false, hasCurves = false;
+
+    HiddenNodes hidden;  ///< which blocks of points are drawn, and when
 
     // What covers so many pixels that its rows are shared out.
     std::vector<LargeTriangle> large;

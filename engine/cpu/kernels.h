@@ -472,6 +472,9 @@ struct Kernels {
     /// What a row mirrors of the picture; false, and nothing is written, where that is nothing.
     bool (*reflectRow)(const shared::FrameConstants& f, const ReflectionInput& in, uint32_t x0, uint32_t y, uint32_t n,
                        const MirroredRow& out);
+    /// Of each 16 pixels of `n` (at most kTile) and `rows`: bits of the depth of the farthest (keyDepthBits); where all
+    /// have a pixel without a key it may return after some of the rows, as that is what is farthest.
+    void (*farthestOf)(const uint64_t* keys, size_t stride, uint32_t rows, uint32_t n, uint32_t* farthest);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -422,6 +422,8 @@ void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
 
 #include "engine/cpu/reflection.inl"
 
+#include "engine/cpu/farthest.inl"
+
 }  // namespace
 
 extern const Kernels STIPPLE_KERNELS, STIPPLE_KERNELS_ORTHOGRAPHIC;
@@ -464,6 +466,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               occludeRow,
                               aoMeanRow,
                               aoSpreadRow,
-                              reflectRow};
+                              reflectRow,
+                              farthestOf};
 
 }  // namespace stipple::cpu

@@ -35,9 +35,16 @@ struct RenderRequest {
     bool wantDepthAndNormal = false;
     /// What a light meets first, drawn before the frame that it lights: depths, and as colours what leaves let through.
     bool isOfCasters = false;
+    /// Points that are hidden behind others need not be drawn, as far as that changes no bit of the picture.
+    bool mayHideNodes = false;
     /// The picture is to be shown by the device that draws it (gpu::Window): where there is such a device it is not
     /// copied to the host, and read has none.
     bool staysOnDevice = false;
+};
+
+/// Of points, what was not drawn because it is hidden behind what was.
+struct HiddenCounts {
+    uint64_t nodes = 0, records = 0;
 };
 
 /// What a backend holds for one effect.
@@ -84,6 +91,8 @@ class Backend : public streaming::ChunkSink {
     /// Waits until a frame is drawn, whose picture stays where it is.
     virtual Result<void> finish(Ticket) { return {}; }
     virtual BackendResources resources() const { return {}; }
+    /// Of the frame that was read or finished last; nothing of backends that draw all that is handed in.
+    virtual HiddenCounts hidden() const { return {}; }
     /// Of the frame that was read or finished last.
     virtual const std::vector<PassTime>& passTimes() const = 0;
 

@@ -16,6 +16,26 @@ bool isSpacingTold(const lod::Hierarchy& h, uint32_t chunk) {
     return h.isStochastic || isTile || h.payload(chunk).spacingCode != 0;
 }
 
+/// Both ends of what the records have along each axis.
+struct LatticeBox {
+    std::array<uint16_t, 3> low, high;
+};
+LatticeBox boxOf(std::span<const shared::PointRecord> records) {
+    uint32_t lowX = 65535, lowY = 65535, lowZ = 65535, highX = 0, highY = 0, highZ = 0;
+    for (const shared::PointRecord& r : records) {
+        lowX = std::min(lowX, shared::recordX(r));
+        lowY = std::min(lowY, shared::recordY(r));
+        lowZ = std::min(lowZ, shared::recordZ(r));
+        highX = std::max(highX, shared::recordX(r));
+        highY = std::max(highY, shared::recordY(r));
+        highZ = std::max(highZ, shared::recordZ(r));
+    }
+    const auto three = [](uint32_t x, uint32_t y, uint32_t z) {
+        return std::array{static_cast<uint16_t>(x), static_cast<uint16_t>(y), static_cast<uint16_t>(z)};
+    };
+    return {three(lowX, lowY, lowZ), three(highX, highY, highZ)};
+}
+
 }  // namespace
 
 Result<void> DiscSizes::upload(streaming::ChunkKey key, lod::Chunk chunk) {
@@ -34,8 +54,13 @@ Result<void> DiscSizes::upload(streaming::ChunkKey key, lod::Chunk chunk) {
     auto& of = sizes_[key.source];
     if (of.size() <= key.chunk) of.resize(key.chunk + 1);
     const bool isTold = key.source < hierarchies_.size() && isSpacingTold(*hierarchies_[key.source], key.chunk);
-    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), static_cast<uint8_t>(usual), isDense,
-                     isTold ? 0 : lod::recordSpacing(records)};
+    const LatticeBox box = boxOf(records);
+    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)),
+                     static_cast<uint8_t>(usual),
+                     isDense,
+                     isTold ? 0 : lod::recordSpacing(records),
+                     box.low,
+                     box.high};
     return backend_.upload(keyOfBackend(key), std::move(chunk));
 }
 
@@ -61,13 +86,14 @@ DiscSizes::Share DiscSizes::shareOf(streaming::ChunkKey key) const {
     return {size.code == 0     ? 0
             : size.code == 255 ? 1
                                : shared::radiusFraction(size.code - 1u),
-            size.isDense, size.code == 0 ? 0 : shared::radiusFraction(size.usual)};
+            size.isDense, size.code == 0 ? 0 : shared::radiusFraction(size.usual), size.low, size.high};
 }
 
 void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
     const double perFocal = double{shared::wideRadius(f.width, f.height)} / double{f.focal};
     draws.hasWideDiscs = draws.hasSmoothDiscs = false;
+    draws.pointBounds.clear();
     // Colours that stand for a node's level or error are not mixed with those of others.
     const bool maySmooth = f.debugView != shared::kDebugLevel && f.debugView != shared::kDebugError;
     DrawBatch& points = draws.of(lod::Kind::points);
@@ -77,6 +103,7 @@ void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
         const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
         const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
         const DiscSizes::Share share = sizes.shareOf(points.keys[i]);
+        draws.pointBounds.push_back({share.low, share.high, d.edge * share.ofEdge});
         // Leaves and the like, which are no surface, have no spacing.
         const double usual = double{d.edge} * double{f.supportScale * share.usual} * double{f.focal};
         const double middle = double{d.base.z} + 32768 * (double{d.axisX.z} + double{d.axisY.z} + double{d.axisZ.z});

@@ -1,9 +1,11 @@
 // What is known of the discs of each node once its chunk has arrived: the largest radius, by which frames without wide
 // discs (shaders/shared/wide_disc.h) have no pass for them, the usual one, by which those whose discs are no wider than
 // a few pixels have none that makes them smooth (shaders/shared/smooth.h), and of older stores the spacing, by which
-// the kernels of coarse levels are closed (shaders/shared/ewa.h); others tell it.
+// the kernels of coarse levels are closed (shaders/shared/ewa.h); others tell it. And in which box of the lattice its
+// records lie, by which nodes are found that are hidden behind others.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "engine/render/backend.h"
@@ -36,6 +38,7 @@ class DiscSizes final : public streaming::ChunkSink {
         float ofEdge = 0;      ///< over the edge of the node's cell; 0 of what has no points
         bool isDense = false;  ///< beyond kMostSpacings
         float usual = 0;       ///< that of a usual one, likewise
+        std::array<uint16_t, 3> low{0, 0, 0}, high{65535, 65535, 65535};  ///< steps between which the records lie
     };
     /// `key`: as the backend has it.
     Share shareOf(streaming::ChunkKey key) const;
@@ -48,6 +51,7 @@ class DiscSizes final : public streaming::ChunkSink {
         uint8_t usual = 0;  ///< mean of the codes, rounded to the nearest
         bool isDense = false;
         float spacing = 0;
+        std::array<uint16_t, 3> low{0, 0, 0}, high{65535, 65535, 65535};
     };
     Size sizeOf(streaming::ChunkKey key) const;
     streaming::ChunkKey keyOfBackend(streaming::ChunkKey key) const;
@@ -59,8 +63,8 @@ class DiscSizes final : public streaming::ChunkSink {
     std::vector<const lod::Hierarchy*> hierarchies_;  ///< by source
 };
 
-/// Sets kNodeWide, kNodeSmooth, DrawList::hasWideDiscs and hasSmoothDiscs, and the spacings of nodes that stores do not
-/// tell.
+/// Sets kNodeWide, kNodeSmooth, DrawList::hasWideDiscs, hasSmoothDiscs and pointBounds, and the spacings of nodes that
+/// stores do not tell.
 void markDiscSizes(const DiscSizes& sizes, DrawList& draws);
 
 }  // namespace stipple::render

@@ -103,6 +103,7 @@ void clear(DrawList& out) {
     out.bends.clear();
     out.swaying = 0;
     out.hasWideDiscs = out.hasSmoothDiscs = false;
+    out.pointBounds.clear();
 }
 
 /// A node of points or curves in camera space.
@@ -198,6 +199,7 @@ void addNodes(const glm::dmat3& cameraFromWorld, const DrawSettings& settings, E
         const bool hasMaterial = node.materials > 0 || node.material != shared::kPlainPoint;
         if (hasMaterial && settings.lit && kind == lod::Kind::points) out.frame.hasMaterials = 1;
         batch.keys.push_back({out.firstSource + instance.source, draw.chunk});
+        batch.instances.push_back(draw.instance);
     }
     if (out.swaying == 0) out.bends.clear();
 }

@@ -52,12 +52,20 @@ struct DrawBatch {
     std::vector<shared::DrawNode> nodes;    ///< of triangles none: DrawList::meshDraws
     std::vector<shared::DrawBlock> blocks;  ///< of triangles one a cluster: its run and place in the chunk
     std::vector<streaming::ChunkKey> keys;  ///< chunk of each node (run)
+    std::vector<uint32_t> instances;        ///< of each node
     bool isEmpty() const { return blocks.empty(); }
     void clear() {
         nodes.clear();
         blocks.clear();
         keys.clear();
+        instances.clear();
     }
+};
+
+/// What the records of a node of points keep to.
+struct NodeBounds {
+    std::array<uint16_t, 3> low{0, 0, 0}, high{65535, 65535, 65535};  ///< steps of its lattice, both included
+    float radius = 0;  ///< no disc is larger: world units, without what the mode adds
 };
 
 /// Clusters of one chunk of a mesh, as many blocks of the batch of triangles.
@@ -93,6 +101,7 @@ struct DrawList {
     bool hasSurfaces() const { return !triangles().isEmpty() || !patches().isEmpty(); }
     bool hasWideDiscs = false;               ///< some nodes of points may hold some (kNodeWide)
     bool hasSmoothDiscs = false;             ///< some nodes of points are kNodeSmooth
+    std::vector<NodeBounds> pointBounds;     ///< of each node of points, from markDiscSizes on
     std::vector<shared::DrawMesh> meshes;    ///< instances of mesh stores that are in view
     std::vector<MeshTextures> meshTextures;  ///< of each of `meshes`
     std::vector<MeshDraw> meshDraws;  ///< runs of clusters: what blocks and keys of the batch of triangles belong to

@@ -229,8 +229,13 @@ Result<uint64_t> drawNodes(FrameState& state, const lod::Cut& cut, const lod::Vi
     request.passes = passesOf(settings.mode, contentOf(state.draws), state.draws.effects);
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     request.staysOnDevice = settings.staysOnDevice;
+    // (What is hidden within a layer is another picture's each time: nothing is known of it.)
+    request.mayHideNodes = settings.mayHideNodes && settings.draw.layer == nullptr && !settings.draw.isBlended;
     count(request.passes, requestedEffects(state.draws.effectsOfScene, settings.draw), state);
     STIPPLE_TRY(drawPicture(state, request));
+    const HiddenCounts hidden = state.backend->hidden();
+    state.counters.nodesHidden += hidden.nodes;
+    state.counters.recordsHidden += hidden.records;
     return request.passes.size();
 }
 
@@ -291,6 +296,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     STIPPLE_TRY(checkFilter(settings.draw));
     uint64_t passes = 0;
     state.effects = {};
+    state.counters.nodesHidden = state.counters.recordsHidden = 0;
     if (hasLayers(state, view, settings)) {
         STIPPLE_ASSIGN(passes, drawLayered(state, view, settings));
         addTone(settings.draw, state.effects);

@@ -31,6 +31,7 @@ struct FrameSettings {
     DrawSettings draw;
     bool wantDepthAndNormal = false;
     bool staysOnDevice = false;  ///< see RenderRequest: FrameState::onDevice, and no image
+    bool mayHideNodes = true;    ///< see RenderRequest: it changes no picture
 };
 
 /// Everything a frame walks through, owned in one place.

@@ -65,7 +65,7 @@ void cutFromBehind(FrameState& state, uint32_t instance, const lod::View& back, 
 FrameSettings settingsFromBehind(const FrameSettings& settings) {
     FrameSettings s = settings;
     s.wantDepthAndNormal = true;
-    s.staysOnDevice = false;
+    s.staysOnDevice = s.mayHideNodes = false;
     s.draw.lit = false;
     s.draw.unlitTriangles = true;
     s.draw.environment.reset();

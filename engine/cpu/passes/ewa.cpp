@@ -28,8 +28,11 @@ void blendDiscs(Frame& frame) {
     for (size_t r = 0; r < frame.secondRuns.size(); ++r)
         if (std::exchange(frame.secondRuns[r], uint8_t{0}) != 0)
             std::fill_n(frame.secondKinds.data() + (r << Visibility::kRunBits), Visibility::kRun, uint8_t{0});
-    TileLists lists(frame, {shared::kOpaqueSpacings, 1 / shared::kOpaqueSigmas, frame.constants.kernelSupport,
-                            frame.constants.lowPass});
+    // (All of them: what is blended, and what light comes past a front, is not told by the nearest depth alone.)
+    TileLists lists(
+        frame,
+        {shared::kOpaqueSpacings, 1 / shared::kOpaqueSigmas, frame.constants.kernelSupport, frame.constants.lowPass},
+        frame.hidden.begin(frame, false));
     lists.place(true);
     lists.draw([&](const PlacedSplat* splats, const uint32_t* places, size_t count, const SplatTile& tile) {
         frame.k.filterTile(frame.constants, frame.tables, frame.blocks.data(), splats, frame.placedColours.data(),

@@ -107,7 +107,7 @@ class DiscLevels {
 };
 
 void exact(Frame& frame) {
-    TileLists lists(frame, {});
+    TileLists lists(frame, {}, frame.hidden.begin(frame, false));
     lists.place(false);  // some are taken away before they are drawn
     DiscLevels levels(frame, lists);
     levels.fill();

@@ -23,19 +23,19 @@ bool isWithin(const shared::FrameConstants& f, const shared::DrawNode& node) {
     return true;
 }
 
-void project(Frame& frame) {
-    std::vector<uint8_t> besideToo(frame.draws->points().nodes.size());  // of each node
-    CompletionQueue<std::vector<shared::WideDisc>> found;
-    for (size_t n = 0; n < besideToo.size(); ++n)
-        besideToo[n] = frame.hasPyramid && ((frame.draws->points().nodes[n].octantMask & shared::kNodeWide) != 0 ||
-                                            !isWithin(frame.constants, frame.draws->points().nodes[n]));
-    frame.executor.parallelFor(frame.blocks.size(), 32, [&](size_t begin, size_t end) {
+using WideDiscs = CompletionQueue<std::vector<shared::WideDisc>>;
+
+/// `besideToo`: of each node.
+void projectBlocks(Frame& frame, std::span<const uint32_t> blocks, const std::vector<uint8_t>& besideToo,
+                   WideDiscs& found) {
+    frame.executor.parallelFor(blocks.size(), 32, [&](size_t begin, size_t end) {
         alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
         std::vector<shared::WideDisc> mine;
         // (At hand: after each atomic store they would be read again.)
         uint64_t* const keys = frame.visibility.data();
         uint8_t* const runs = frame.runs.data();
-        for (size_t b = begin; b < end; ++b) {
+        for (size_t k = begin; k < end; ++k) {
+            const uint32_t b = blocks[k];
             if (frame.isSmoothing && (frame.blocks[b].node->octantMask & shared::kNodeSmooth) == 0) continue;
             const uint32_t count =
                 std::min(shared::kRecordsPerBlock, frame.blocks[b].node->count - frame.draws->points().blocks[b].first);
@@ -47,14 +47,14 @@ void project(Frame& frame) {
                     __builtin_prefetch(&keys[pixel[i + kAhead]], 1);
                 if (pixel[i] >= kWidePixel) {
                     if (pixel[i] == ~0u) continue;
-                    const auto id = static_cast<uint32_t>(b) * shared::kRecordsPerBlock + i;
+                    const uint32_t id = b * shared::kRecordsPerBlock + i;
                     const shared::WideDisc d =
                         shared::wideDisc(*frame.blocks[b].node, frame.blocks[b].records[i],
                                          frame.constants.supportScale, id, shared::frameLens(frame.constants));
                     if (shared::reachesPicture(d, frame.constants) > 0.5f) mine.push_back(d);
                     continue;
                 }
-                const uint64_t key = shared::visibilityKey(depth[i], shared::drawId(static_cast<uint32_t>(b), i));
+                const uint64_t key = shared::visibilityKey(depth[i], shared::drawId(b, i));
                 const std::atomic_ref<uint8_t> run(runs[pixel[i] >> Visibility::kRunBits]);
                 if (run.load(std::memory_order_relaxed) == 0) run.store(1, std::memory_order_relaxed);
                 const std::atomic_ref<uint64_t> entry(keys[pixel[i]]);
@@ -65,6 +65,17 @@ void project(Frame& frame) {
         }
         if (!mine.empty()) found.push(std::move(mine));
     });
+}
+
+void project(Frame& frame) {
+    const std::vector<shared::DrawNode>& nodes = frame.draws->points().nodes;
+    std::vector<uint8_t> besideToo(nodes.size());
+    for (size_t n = 0; n < nodes.size(); ++n)
+        besideToo[n] = frame.hasPyramid &&
+                       ((nodes[n].octantMask & shared::kNodeWide) != 0 || !isWithin(frame.constants, nodes[n]));
+    WideDiscs found;
+    projectBlocks(frame, frame.hidden.begin(frame, frame.mayHideNodes && !frame.isSmoothing), besideToo, found);
+    projectBlocks(frame, frame.hidden.rest(frame, false), besideToo, found);
     frame.discs.clear();
     for (const auto& some : found.takeAll()) frame.discs.insert(frame.discs.end(), some.begin(), some.end());
     // Sums are rounded: their order must not be that of the threads.

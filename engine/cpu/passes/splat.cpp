@@ -5,12 +5,17 @@
 namespace stipple::cpu {
 namespace {
 
-void splat(Frame& frame) {
-    TileLists lists(frame, {});
+void drawDiscs(Frame& frame, std::span<const uint32_t> blocks) {
+    TileLists lists(frame, {}, blocks);
     lists.place(true);
     lists.draw([&](const PlacedSplat* splats, const uint32_t* places, size_t count, const SplatTile& tile) {
         frame.k.splatTile(frame.constants, splats, places, count, tile, frame.visible());
     });
+}
+
+void splat(Frame& frame) {
+    drawDiscs(frame, frame.hidden.begin(frame, frame.mayHideNodes));
+    if (const auto rest = frame.hidden.rest(frame, true); !rest.empty()) drawDiscs(frame, rest);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include "engine/cpu/frame.h"
@@ -13,20 +14,22 @@ class TileLists {
   public:
     static constexpr uint32_t kMostChunks = 128;  ///< whose discs are kept, and counted, together
 
-    TileLists(Frame& frame, const SplatReach& reach)
+    /// `blocks`: of the frame, which are to be drawn, in their order.
+    TileLists(Frame& frame, const SplatReach& reach, std::span<const uint32_t> blocks)
         : frame_(frame),
           reach_(reach),
+          blocks_(blocks),
           columns_((frame.constants.width + SplatTile::kWidth - 1) / SplatTile::kWidth),
           rows_((frame.constants.height + SplatTile::kHeight - 1) / SplatTile::kHeight),
-          blocksPerChunk_(std::max(4u, (static_cast<uint32_t>(frame.blocks.size()) + kMostChunks - 1) / kMostChunks)),
-          chunks_((static_cast<uint32_t>(frame.blocks.size()) + blocksPerChunk_ - 1) / blocksPerChunk_),
+          blocksPerChunk_(std::max(4u, (static_cast<uint32_t>(blocks.size()) + kMostChunks - 1) / kMostChunks)),
+          chunks_((static_cast<uint32_t>(blocks.size()) + blocksPerChunk_ - 1) / blocksPerChunk_),
           splats_(frame.placedSplats),
           ranges_(frame.splatTiles) {}
 
     /// `countsTiles`: draw() follows, of all that is placed.
     void place(bool countsTiles) {
         isCounted_ = countsTiles;
-        splats_.resize(frame_.blocks.size() * shared::kRecordsPerBlock);
+        splats_.resize(blocks_.size() * shared::kRecordsPerBlock);
         if (frame_.isBlended()) frame_.placedColours.resize(splats_.size());
         ranges_.resize(splats_.size());
         counts_.assign(chunks_, 0);
@@ -35,14 +38,14 @@ class TileLists {
         frame_.executor.parallelFor(chunks_, 1, [&](size_t begin, size_t end) {
             SplatBlock placed;
             for (size_t c = begin; c < end; ++c) {
-                const size_t first = c * blocksPerChunk_,
-                             last = std::min(first + blocksPerChunk_, frame_.blocks.size());
-                for (size_t b = first; b < last; ++b) {
+                const size_t first = c * blocksPerChunk_, last = std::min(first + blocksPerChunk_, blocks_.size());
+                for (size_t k = first; k < last; ++k) {
+                    const uint32_t b = blocks_[k];
                     const BlockSource& block = frame_.blocks[b];
                     const uint32_t count =
                         std::min(shared::kRecordsPerBlock, block.node->count - frame_.draws->points().blocks[b].first);
                     frame_.k.placeSplats(frame_.constants, *block.node, block.records, count, reach_, placed);
-                    keep(placed, count, c, static_cast<uint32_t>(b * shared::kRecordsPerBlock));
+                    keep(placed, count, c, b * shared::kRecordsPerBlock);
                 }
             }
         });
@@ -192,6 +195,7 @@ class TileLists {
 
     Frame& frame_;
     const SplatReach reach_;
+    std::span<const uint32_t> blocks_;
     uint32_t columns_, rows_, blocksPerChunk_, chunks_;
     std::vector<PlacedSplat>& splats_;  ///< of each chunk, closed up
     std::vector<TileRange>& ranges_;    ///< of each of them
