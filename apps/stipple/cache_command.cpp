@@ -112,6 +112,8 @@ Result<void> clean(const CacheCommand& o) {
                 if (daysSince(entry.used) >= o.olderDays && cache.remove(entry)) removed.push_back(std::move(entry));
         } else {
             removed = cache.shrinkTo(most);
+            std::error_code ignored;
+            if (most == 0) std::filesystem::remove_all(scene::CacheFolder::pipelinesPath(), ignored);
         }
         for (const scene::CacheEntry& entry : cache.entries()) kept += entry.isInUse ? 1 : 0;
     }
@@ -138,7 +140,8 @@ void setupCache(CLI::App& app, int& status) {
     shown->callback([o, &status] {
         if (const auto result = list(*o); !result) status = report(result.error());
     });
-    CLI::App* emptied = sub->add_subcommand("clean", "remove all that is not in use, or a part of it");
+    CLI::App* emptied =
+        sub->add_subcommand("clean", "remove all that is not in use (what drivers compiled, too), or a part of it");
     auto* older = emptied->add_option("--older", o->olderDays, "only what was not used for that many days")
                       ->transform(within(0.0, 1e6))
                       ->type_name("DAYS");

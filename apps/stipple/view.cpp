@@ -419,7 +419,7 @@ Result<Stage> setStage(const ViewOptions& o, const std::string& title, const glm
     auto window = gpu::Window::create(settings);
     if (window && isGpu) {
         stage.window = std::move(*window);
-        auto backend = gpu::makeGpuBackendOn(stage.window->device(), scene::CacheFolder::path());
+        auto backend = gpu::makeGpuBackendOn(stage.window->device(), scene::CacheFolder::pipelinesPath());
         stage.isShared = backend.has_value();
         if (!backend && o.device == "auto") backend = makeBackend("cpu", executor);
         if (!backend) return tl::unexpected<Error>(backend.error());

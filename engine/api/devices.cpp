@@ -21,7 +21,7 @@ Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, 
         // A real GPU if there is one; software Vulkan only when asked for.
         if (gpu::hasHardwareDevice()) {
             gpu::GpuSettings settings;
-            settings.cacheFolder = scene::CacheFolder::path();
+            settings.cacheFolder = scene::CacheFolder::pipelinesPath();
             auto backend = gpu::makeGpuBackend(settings);
             if (backend) return backend;
         }
@@ -31,7 +31,7 @@ Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, 
         gpu::GpuSettings settings;
         settings.deviceName = device.size() > 4 ? device.substr(4) : "";
         settings.validation = std::getenv("STIPPLE_VALIDATION") != nullptr;
-        settings.cacheFolder = scene::CacheFolder::path();
+        settings.cacheFolder = scene::CacheFolder::pipelinesPath();
         return gpu::makeGpuBackend(settings);
     }
 #else

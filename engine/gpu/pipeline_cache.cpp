@@ -15,7 +15,7 @@ std::string fileNameOf(const Device& device) {
     vkGetPhysicalDeviceProperties(device.physical, &properties);
     const uint64_t key = hashBytes(properties.pipelineCacheUUID, sizeof properties.pipelineCacheUUID,
                                    uint64_t{properties.vendorID} << 32 | properties.deviceID);
-    return "pipelines-" + hexDigits(key ^ properties.driverVersion) + ".bin";
+    return hexDigits(key ^ properties.driverVersion) + ".bin";
 }
 
 /// The driver's bytes; none where the file is not what was written.

@@ -285,6 +285,8 @@ TEST(Cache, ListsAndCleans) {
     }
     EXPECT_FALSE(place.builds("a.las")) << "and is now the last used";
     test::spit(place / "cache/stipple/notes.txt", "somebody else's");
+    fs::create_directories(place / "cache/stipple/pipelines");
+    test::spit(place / "cache/stipple/pipelines/0.bin", "what a driver compiled");
     const auto j = place.list();
     ASSERT_EQ(j["entries"].size(), 3u);
     EXPECT_EQ(j["entries"][0]["inputs"][0], place / "a.las");
@@ -304,10 +306,12 @@ TEST(Cache, ListsAndCleans) {
     const auto rest = place.list();
     ASSERT_EQ(rest["entries"].size(), 2u);
     EXPECT_EQ(rest["entries"][1]["inputs"][0], place / "c.las") << "b was used least recently";
+    EXPECT_TRUE(fs::exists(place / "cache/stipple/pipelines/0.bin"));
     EXPECT_EQ(place.run("cache clean --to potato").code, 2);
     EXPECT_EQ(place.run("cache clean --older 1 --to 1G").code, 2);
     EXPECT_EQ(place.run("cache clean").code, 0);
     EXPECT_EQ(place.entries(), 0u);
+    EXPECT_FALSE(fs::exists(place / "cache/stipple/pipelines"));
     EXPECT_EQ(test::slurp(place / "cache/stipple/notes.txt"), "somebody else's");
 }
 

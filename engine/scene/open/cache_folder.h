@@ -33,6 +33,8 @@ class CacheFolder {
   public:
     /// $XDG_CACHE_HOME/stipple or ~/.cache/stipple, whether it is there or not.
     static std::string path();
+    /// Within it: where the gpu backend keeps what drivers compile. Anything in there may go at any time.
+    static std::string pipelinesPath() { return path() + "/pipelines"; }
     /// Made if it is not there.
     static Result<CacheFolder> open();
 
