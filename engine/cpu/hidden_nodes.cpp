@@ -92,6 +92,8 @@ NodeReach reachOf(const shared::FrameConstants& f, const shared::DrawNode& node,
             }
         }
     }
+    constexpr double kFarthest = 1e30;  // beyond it fp32 may overflow
+    if (!(nearest < kFarthest)) return reach;
     const auto depth = static_cast<float>(nearest * kDepthMargin);
     if (!(depth > f.nearPlane) || !std::isfinite(across.low + across.high + down.low + down.high)) return reach;
     reach.nearest = shared::floatBitsToUint(depth);
