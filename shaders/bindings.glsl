@@ -22,7 +22,7 @@ layout(set = 0, binding = kNodesBinding, scalar) readonly buffer NodeBlock { Dra
 layout(set = 0, binding = kBlocksBinding, scalar) readonly buffer BlockBlock { DrawBlock blocks[]; };
 layout(set = 0, binding = kVisibilityBinding, scalar) buffer VisibilityBlock { uint64_t visibility[]; };
 #ifndef TEXELS
-#define TEXELS  // coherent: a workgroup reads what others of its threads have written
+#define TEXELS  // pull_tail says coherent: its threads read what others of them have written
 #endif
 layout(set = 0, binding = kTexelsBinding, scalar) TEXELS buffer TexelBlock { uint texels[]; };
 layout(set = 0, binding = kStatsBinding, scalar) buffer StatsBlock { uint largestRadiusBits; };
@@ -35,10 +35,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Se
 
 layout(push_constant, scalar) uniform StepBlock { Step stepInfo; };
 
-// Offers a key to a pixel. Most lose, and need no atomic operation to: keys only fall, so that one that was read too early
-// is larger, and hides nothing.
+// Offers a key to a pixel. Most lose by their depth, and need no atomic operation to: keys only fall, so that a depth that
+// was read too early is larger, and hides nothing. (Its word alone: of two words one might be older than the other.)
 void offerKey(uint at, uint64_t key) {
-    if (key < visibility[at]) atomicMin(visibility[at], key);
+    if (uint(key >> 32) <= uint(visibility[at] >> 32)) atomicMin(visibility[at], key);
 }
 
 Lens frameLensHere() { return lensOf(frame.focal, frame.orthographic != 0u); }

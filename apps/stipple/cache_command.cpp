@@ -112,8 +112,9 @@ Result<void> clean(const CacheCommand& o) {
                 if (daysSince(entry.used) >= o.olderDays && cache.remove(entry)) removed.push_back(std::move(entry));
         } else {
             removed = cache.shrinkTo(most);
+            const std::string pipelines = scene::CacheFolder::pipelinesPath();
             std::error_code ignored;
-            if (most == 0) std::filesystem::remove_all(scene::CacheFolder::pipelinesPath(), ignored);
+            if (most == 0 && !pipelines.empty()) std::filesystem::remove_all(pipelines, ignored);
         }
         for (const scene::CacheEntry& entry : cache.entries()) kept += entry.isInUse ? 1 : 0;
     }

@@ -305,6 +305,7 @@ Result<VkDeviceMemory> allocateMemory(const Device& d, const VkMemoryRequirement
     info.pNext = isAddressed ? &flags : nullptr;
     info.allocationSize = needs.size;
     VkResult last = VK_ERROR_FEATURE_NOT_PRESENT;
+    const auto isFull = [&] { return last == VK_ERROR_OUT_OF_DEVICE_MEMORY || last == VK_ERROR_OUT_OF_HOST_MEMORY; };
     for (const VkMemoryPropertyFlags wish : wishesFor(memory)) {
         const std::optional<uint32_t> type = d.memoryType(needs.memoryTypeBits, wish);
         if (!type) continue;
@@ -312,6 +313,7 @@ Result<VkDeviceMemory> allocateMemory(const Device& d, const VkMemoryRequirement
         VkDeviceMemory made = VK_NULL_HANDLE;
         last = vkAllocateMemory(d.device, &info, nullptr, &made);
         if (last == VK_SUCCESS) return made;
+        if (memory != Memory::table || !isFull()) break;
     }
     return vulkanError(last, fmt::format("no memory for {} ({} bytes)", name, needs.size));
 }

@@ -99,8 +99,8 @@ enum class Memory : uint8_t {
     host,    ///< copies to and from it; quick to read for the host
 };
 
-/// Of the best kind that there is room in: what the host reaches of the device's memory may be little. isAddressed: of
-/// a buffer whose device address is asked for.
+/// Of the best kind that there is; tables of the next one where there is no room in that: what the host reaches of the
+/// device's memory may be little. isAddressed: of a buffer whose device address is asked for.
 Result<VkDeviceMemory> allocateMemory(const Device& device, const VkMemoryRequirements& needs, Memory memory,
                                       bool isAddressed, const std::string& name);
 

@@ -1,8 +1,7 @@
-// What the driver has compiled, kept from one run to the next: a file a device and driver, with a hash before the
-// driver's own bytes. Whatever is wrong with it, pipelines are compiled anew.
+// What the driver has compiled, kept from one run to the next: a file a device, driver and set of shaders, with a hash
+// before the driver's own bytes. Whatever is wrong with it, pipelines are compiled anew.
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include "engine/gpu/device.h"
@@ -12,15 +11,15 @@ namespace stipple::gpu {
 class PipelineCache {
   public:
     /// `folder`: of the file; empty: nothing is read or written.
-    static Result<std::unique_ptr<PipelineCache>> create(const Device& device, const std::string& folder);
-    /// Writes the file if there is more than it had.
+    PipelineCache(const Device& device, const std::string& folder);
+    /// Writes the file if there is something else than it had.
     ~PipelineCache();
     PipelineCache(const PipelineCache&) = delete;
     PipelineCache& operator=(const PipelineCache&) = delete;
-    VkPipelineCache handle() const { return handle_; }
+    VkPipelineCache handle() const { return handle_; }  ///< null where the device makes none: pipelines do without
 
   private:
-    explicit PipelineCache(const Device& device) : device_(device) {}
+    std::vector<uint8_t> read() const;
     void write() const;
     const Device& device_;
     VkPipelineCache handle_ = VK_NULL_HANDLE;

@@ -10,7 +10,7 @@ namespace stipple::gpu {
 
 Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device, const std::string& cacheFolder) {
     std::unique_ptr<Pipelines> p(new Pipelines(device));
-    STIPPLE_ASSIGN(p->cache_, PipelineCache::create(device, cacheFolder));
+    p->cache_ = std::make_unique<PipelineCache>(device, cacheFolder);
     std::array<VkDescriptorSetLayoutBinding, shared::kBindings> bindings{};
     for (uint32_t i = 0; i < shared::kBindings; ++i)
         bindings.at(i) = {i, descriptorType(i), 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};

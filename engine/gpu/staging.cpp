@@ -9,12 +9,13 @@ Result<void> Staging::ensure(uint64_t bytes) {
     if (bytes <= buffer_.bytes()) return {};
     constexpr VkBufferUsageFlags kUsage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
     STIPPLE_ASSIGN(const uint64_t room, roomFor(device_->limits, bytes, kUsage, "staging", device_->deviceName));
-    // At least twice as much as before, so that what lies there is moved seldom.
-    const uint64_t wanted = std::max({room, 2 * buffer_.bytes(), uint64_t{1} << 20});
-    STIPPLE_ASSIGN(Buffer larger,
-                   Buffer::create(*device_, std::min(wanted, device_->limits.buffer), kUsage, Memory::host, "staging"));
-    if (used_ > 0) std::memcpy(larger.mapped(), buffer_.mapped(), used_);
-    buffer_ = std::move(larger);
+    // At least twice as much as before, so that what lies there is moved seldom; if there is no room, what is needed.
+    const uint64_t wanted = std::min(std::max({room, 2 * buffer_.bytes(), uint64_t{1} << 20}), device_->limits.buffer);
+    auto larger = Buffer::create(*device_, wanted, kUsage, Memory::host, "staging");
+    if (!larger) larger = Buffer::create(*device_, bytes, kUsage, Memory::host, "staging");
+    if (!larger) return tl::unexpected(larger.error());
+    if (used_ > 0) std::memcpy(larger->mapped(), buffer_.mapped(), used_);
+    buffer_ = std::move(*larger);
     return {};
 }
 
@@ -32,6 +33,7 @@ Result<void> Staging::add(const lod::Chunk& chunk, VkBuffer page, uint64_t offse
 
 void Staging::drop(VkBuffer page, uint64_t offset) {
     std::erase_if(copies_, [&](const Copy& c) { return c.page == page && c.region.dstOffset == offset; });
+    if (copies_.empty()) used_ = 0;
 }
 
 void Staging::recordCopies(VkCommandBuffer commands) const {
@@ -39,8 +41,10 @@ void Staging::recordCopies(VkCommandBuffer commands) const {
 }
 
 void Staging::clear() {
+    constexpr uint64_t kMostKept = uint64_t{256} << 20;
     copies_.clear();
     used_ = 0;
+    if (buffer_.bytes() > kMostKept) buffer_ = Buffer();  // a whole scene came at once
 }
 
 }  // namespace stipple::gpu

@@ -19,7 +19,7 @@ class Staging {
     void drop(VkBuffer page, uint64_t offset);
     bool isEmpty() const { return copies_.empty(); }
     void recordCopies(VkCommandBuffer commands) const;
-    /// The device has copied it all; the memory stays.
+    /// The device has copied it all; the memory stays, if it is not much.
     void clear();
 
   private:

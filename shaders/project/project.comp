@@ -4,7 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../discs.glsl"
 #include "../shared/splat_size.h"
-layout(local_size_x = 32) in;
+layout(local_size_x = 32) in;  // what was fastest on the one card at hand (tests/bench/results/2026-11-27-gpu-h100.md)
 const uint kThreads = 32u;
 
 void project(DrawNode node, PointRecord r, uint block, uint lane) {

@@ -1,15 +1,14 @@
-// The coarse end of the pyramid in one workgroup: from level stepInfo.level, of few texels, to the coarsest and back. What
+// The tail of the pyramid (pyramid_tail.h) in one workgroup: from level stepInfo.level, of few texels, to the coarsest and back. What
 // a thread reads of a level others have written: a barrier after each.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define TEXELS coherent
 #include "../bindings.glsl"
+#include "../shared/pyramid_tail.h"
 layout(local_size_x = 256) in;
 
-const uint kMostTailLevels = 33u;
-
 void main() {
-    PyramidLevel places[kMostTailLevels];
+    PyramidLevel places[kTailLevels];
     const uint words = kTexelWords + (frame.hasMaterials != 0u ? 1u : 0u);
     const uint levels = levelCount();
     uint level = stepInfo.level;

@@ -2,9 +2,11 @@
 # tests/bench/accuracy_figures.sh [PROGRAM]: writes results/accuracy.md and its plots again: what accuracy costs, of
 # grown scenes and, with STIPPLE_DATA, of real data. Half an hour of an idle machine. STUDIES=FOLDER makes the studies
 # there, one a scene, and keeps them: the same command goes on where it was stopped. SCENES=WORDS: only these.
-# OPTIONS=...: of `stipple study`, for less or more than that; the page says what it is of. NAME=WORD: of the page, where
-# it is not to take the place of accuracy.md (another machine or device).
+# OPTIONS=...: of `stipple study`, for less or more than that; the page says what it is of. PAGE=accuracy-WORD: where it
+# is not to take the place of accuracy.md (another machine or device).
 set -euo pipefail
+page=${PAGE:-accuracy}
+[[ $page =~ ^accuracy[-a-z0-9]*$ ]] || { echo "PAGE=$page: the name of a page is accuracy-WORD" >&2; exit 2; }
 here=$(realpath "$(dirname "${BASH_SOURCE[0]}")")
 source "$here/common.sh"
 studies=$(realpath -m "${STUDIES:-$work/studies}")
@@ -40,4 +42,4 @@ if real outcrop.laz 02_scans/outcrop_rgb_cloudcompare/example_data.laz; then
     study stroke stroke.trk --modes surface
 fi
 study demo demo/demo.glb
-python3 "$here/accuracy_tables.py" "${made[@]}" "$here/results" "${NAME:-accuracy}"
+python3 "$here/accuracy_tables.py" "${made[@]}" "$here/results" "$page"

@@ -10,7 +10,7 @@ plots = os.path.join(results, page)
 shutil.rmtree(plots, ignore_errors=True)
 os.makedirs(plots)
 p = all_of[-1][1]["provenance"]
-load = max(d["provenance"]["load"] for _, d in all_of)
+load = min(d["provenance"]["load"] for _, d in all_of)  # (others have that of the study before them)
 out = []
 
 
@@ -57,14 +57,14 @@ def all_told(rows):
 out.append("# What accuracy costs\n")
 plan = all_of[-1][1]["plan"]
 first = all_of[-1][1]["configurations"][0]
-asked = "".join(f"{name}='{os.environ[name]}' " for name in ("NAME", "OPTIONS", "SCENES") if os.environ.get(name))
+asked = "".join(f"{name}='{os.environ[name]}' " for name in ("PAGE", "OPTIONS", "SCENES") if os.environ.get(name))
 out.append(f"Made by `STIPPLE_DATA=DATA {asked}tests/bench/accuracy_figures.sh` (it runs `stipple study SCENE --quick`, here at {first['width']} x {first['height']}, {', '.join(f'{t:g}' for t in plan['targets_px'])} px asked for, {plan['blocks']} blocks of {plan['frames']} frames; one camera of")
 out.append("each of orbit, dolly, fly-through and grazing; dB, FLIP and silhouettes against the traced full detail; px: distance in space of")
 out.append("each drawn pixel from the nearest full-detail surface, by brute force). Milliseconds are medians with 95 % of bootstraps over blocks.")
 out.append("Pop: greatest change of a channel, of 255, at p99.9 where the cut is that of a camera 9 % farther away and the camera is not; most: of any pixel; faded: as pop, of means of 16 frames over which levels fade, at 160 x 90. Flicker: by how")
 out.append("much more a turn of a quarter of a pixel changes pixels than it changes the truth, of 255, mean.\n")
 out.append(f"Machine: {p['processor']}, {p['threads']} cores; load {load:.1f}; {p['date']}; {p['device']}; {p['compiler']}, {p['flags']}.\n")
-if load > p['threads']:  # (a study that was just before it has as many threads)
+if load > 2:
     out.append("**Others shared the machine** while this was measured. That touches times and nothing else: the columns ms and 95 %, the milliseconds of what a")
     out.append("step costs, and the seconds after starts and jumps. Frames of all modes and errors were drawn in turn, in blocks of another order each, so that ratios between")
     out.append("times hold where they are apart; as they stand, milliseconds are too high. Errors, records and bytes are the same on any machine, busy or not.\n")

@@ -1,6 +1,7 @@
 // From the visibility buffer to texels, and over the levels of the pyramid.
 #include "engine/gpu/passes/passes.h"
 #include "engine/render/kinds/kind.h"
+#include "shaders/shared/pyramid_tail.h"
 
 namespace stipple::gpu {
 
@@ -14,11 +15,10 @@ constinit const GpuPass resolvePass{[](Recording& f) {
 
 namespace {
 
-/// From this level on one workgroup pulls and pushes: dispatches for so few texels take longer than their work.
+/// From this level on one workgroup pulls and pushes.
 size_t firstOfTail(const std::vector<Level>& levels) {
-    constexpr uint32_t kFewTexels = 4096;
     size_t level = 0;
-    while (levels[level].width * levels[level].height > kFewTexels) ++level;
+    while (uint64_t{levels[level].width} * levels[level].height > shared::kTailTexels) ++level;
     return level;
 }
 

@@ -92,6 +92,11 @@ std::string CacheFolder::path() {
         .string();
 }
 
+std::string CacheFolder::pipelinesPath() {
+    const std::string folder = path();
+    return fs::path(folder).is_absolute() ? folder + "/pipelines" : std::string();
+}
+
 Result<CacheFolder> CacheFolder::open() {
     const std::string folder = path();
     std::error_code error;

@@ -33,8 +33,9 @@ class CacheFolder {
   public:
     /// $XDG_CACHE_HOME/stipple or ~/.cache/stipple, whether it is there or not.
     static std::string path();
-    /// Within it: where the gpu backend keeps what drivers compile. Anything in there may go at any time.
-    static std::string pipelinesPath() { return path() + "/pipelines"; }
+    /// Within it: where the gpu backend keeps what drivers compile. Anything in there may go at any time. Empty where
+    /// the folder is not the user's own (a relative one): a driver is given nothing that happens to lie there.
+    static std::string pipelinesPath();
     /// Made if it is not there.
     static Result<CacheFolder> open();
 

@@ -1,0 +1,12 @@
+// The coarse end of the pyramid, which one workgroup pulls and pushes: dispatches for so few texels take longer than
+// their work.
+#ifndef STIPPLE_SHARED_PYRAMID_TAIL_H
+#define STIPPLE_SHARED_PYRAMID_TAIL_H
+#include "types.h"
+SHARED_BEGIN
+
+const uint kTailTexels = 4096u;  // of its finest level, at most
+const uint kTailLevels = 13u;    // each has half as many texels, or less: 4,096 of one row, 2,048 ... 1
+
+SHARED_END
+#endif
