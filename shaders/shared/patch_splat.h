@@ -12,12 +12,6 @@
 #include "patch.h"
 SHARED_BEGIN
 
-#ifdef __cplusplus
-#define SHARED_PRECISE  // kernels are compiled without fused multiplications
-#else
-#define SHARED_PRECISE precise
-#endif
-
 const float kNoPatch = 3.0e38f;  // in the place of a depth
 
 // Depth at which a ray meets a triangle; kNoPatch: nowhere, or nearer than that. Products are rounded before they are

@@ -38,6 +38,8 @@ SHARED_FN float min(float a, float b) { return b < a ? b : a; }
 SHARED_FN float max(float a, float b) { return a < b ? b : a; }
 SHARED_FN float floor(float a) { return std::floor(a); }
 SHARED_END
+// Of what must be rounded as it is written: kernels are compiled without fused multiplications.
+#define SHARED_PRECISE
 // A table of floats that GLSL reads from a buffer and C++ from its first argument.
 #define SHARED_TABLE const float *environment,
 #define SHARED_TABLE_USE environment,
@@ -53,6 +55,7 @@ SHARED_END
 #define SHARED_SEEN_BEHIND(at) seen.behind[at]
 #define SHARED_SEEN_BACK(at) seen.back[at]
 #else
+#define SHARED_PRECISE precise
 #define SHARED_TABLE
 #define SHARED_TABLE_USE
 #define SHARED_SEEN

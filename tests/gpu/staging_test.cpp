@@ -1,0 +1,70 @@
+// Chunks on their way to the device: what is dropped does not get there, what lies there survives that more room is
+// made.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "engine/gpu/staging.h"
+#include "tests/gpu/one_time_commands.h"
+
+namespace stipple::gpu {
+namespace {
+
+lod::Chunk chunkOf(size_t records, uint32_t word) {
+    lod::Chunk chunk;
+    chunk.records.assign(records, shared::PointRecord{word, word + 1, word + 2, word + 3});
+    return chunk;
+}
+
+TEST(Staging, CopiesWhatWasNotDroppedToItsPlaces) {
+    const auto made = Device::create({"", true, {}, {}});
+    ASSERT_TRUE(made) << made.error().line();
+    const Device& device = **made;
+    constexpr uint64_t kPage = uint64_t{1} << 22, kSmall = 1000,
+                       kLarge = 100'000;  // records; the latter need more room
+    auto page = Buffer::create(device, kPage, VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                               Memory::device, "page");
+    auto host = Buffer::create(device, kPage, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::host, "copy");
+    ASSERT_TRUE(page);
+    ASSERT_TRUE(host);
+    Staging staging(device);
+    EXPECT_TRUE(staging.isEmpty());
+    for (const uint32_t round : {100u, 200u}) {  // the second finds the memory of the first
+        ASSERT_TRUE(staging.add(chunkOf(kSmall, round), page->handle(), 0));
+        ASSERT_TRUE(staging.add(chunkOf(kSmall, 999), page->handle(), kPage / 2));
+        staging.drop(page->handle(), kPage / 2);
+        EXPECT_FALSE(staging.isEmpty());
+        ASSERT_TRUE(staging.add(chunkOf(kLarge, round + 10), page->handle(), 65536));
+        OneTimeCommands commands(device);
+        vkCmdFillBuffer(commands.handle(), page->handle(), 0, VK_WHOLE_SIZE, 7);
+        VkMemoryBarrier2 between{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
+        between.srcStageMask = between.dstStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
+        between.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
+        between.dstAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT | VK_ACCESS_2_TRANSFER_READ_BIT;
+        recordBarriers(commands.handle(), {}, &between);
+        staging.recordCopies(commands.handle());
+        recordBarriers(commands.handle(), {}, &between);
+        const VkBufferCopy all{0, 0, kPage};
+        vkCmdCopyBuffer(commands.handle(), page->handle(), host->handle(), 1, &all);
+        commands.run();
+        const auto* const words = static_cast<const uint32_t*>(host->mapped());
+        const auto holds = [&](uint64_t offset, uint64_t records, uint32_t word) {
+            for (uint64_t i = 0; i < 4 * records; ++i)
+                if (words[offset / 4 + i] != word + i % 4) return false;
+            return true;
+        };
+        EXPECT_TRUE(holds(0, kSmall, round));
+        EXPECT_TRUE(holds(65536, kLarge, round + 10));
+        EXPECT_EQ(words[4 * kSmall], 7u) << "behind the first";
+        EXPECT_EQ(words[kPage / 8], 7u) << "what was dropped";
+        staging.clear();
+        EXPECT_TRUE(staging.isEmpty());
+    }
+    ASSERT_TRUE(staging.add(chunkOf(1, 1), page->handle(), 0));
+    staging.drop(page->handle(), 0);
+    EXPECT_TRUE(staging.isEmpty());
+    for (const std::string& message : device.messages()) ADD_FAILURE() << message;
+}
+
+}  // namespace
+}  // namespace stipple::gpu
