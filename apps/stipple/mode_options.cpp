@@ -73,9 +73,10 @@ void ModeOptions::addTo(CLI::App& sub, bool hasReference) {
                    "which jumps where they meet)")
         ->check(oneOf({"correct", "direct"}))
         ->capture_default_str();
-    sub.add_option("--hidden", hidden,
-                   "points behind others that hide all of their node: skip (the picture is the same, to the bit), or "
-                   "draw")
+    sub.add_option(
+           "--hidden", hidden,
+           "points behind others that hide all of their node: skip (the picture is the same, to the bit; within "
+           "a budget they are not refined, either, and the rest is finer), or draw")
         ->check(oneOf({"skip", "draw"}))
         ->capture_default_str();
     sub.add_option(
@@ -107,7 +108,7 @@ void ModeOptions::applyTo(render::FrameSettings& settings) const {
                             : refract == "screen" ? shared::kRefractScreen
                                                   : shared::kRefractEnvironment;
     settings.draw.opacity = static_cast<float>(opacity);
-    settings.mayHideNodes = hidden == "skip";
+    settings.mayHideNodes = settings.leavesHiddenCoarse = hidden == "skip";
     settings.draw.perSurfel = normalise == "surfel";
     settings.draw.patchAs = patchAs == "samples"      ? lod::kPatchesAsSamples
                             : patchAs != "splats"     ? shared::kPatchStrips

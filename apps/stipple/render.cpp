@@ -125,6 +125,8 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"nodes_missing", c.nodesMissing},
             {"nodes_hidden", c.nodesHidden},
             {"records_hidden", c.recordsHidden},
+            {"nodes_left_coarse", c.nodesLeftCoarse},
+            {"nodes_seen_coarse", c.nodesSeenCoarse},
             {"records_tested", c.recordsTested},
             {"proxies", c.proxies},
             {"group_members", c.groupMembers},

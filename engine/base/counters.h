@@ -8,10 +8,12 @@ namespace stipple {
 struct FrameCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0;
     uint64_t recordsDrawn = 0, recordsTested = 0, trianglesDrawn = 0;
-    uint64_t proxies = 0;                          ///< instances of which points were drawn
-    uint64_t groupMembers = 0;                     ///< instances of instance groups that were looked at one by one
-    uint64_t nodesHidden = 0, recordsHidden = 0;   ///< of those drawn: left out, as they are behind others
-    uint64_t nodesSwaying = 0;                     ///< moved by wind, by a tenth of a pixel at least
+    uint64_t proxies = 0;                         ///< instances of which points were drawn
+    uint64_t groupMembers = 0;                    ///< instances of instance groups that were looked at one by one
+    uint64_t nodesHidden = 0, recordsHidden = 0;  ///< of those drawn: left out, as they are behind others
+    uint64_t nodesLeftCoarse = 0;  ///< of those drawn: not refined, as they are hidden and the budget is short
+    uint64_t nodesSeenCoarse = 0;  ///< of these: seen all the same, and refined in the next frame
+    uint64_t nodesSwaying = 0;     ///< moved by wind, by a tenth of a pixel at least
     uint64_t shadowMaps = 0, shadowMapsDrawn = 0;  ///< of lights that cast shadows; of those drawn in this frame
     uint64_t shadowLightsLeft = 0;                 ///< lights that would cast, beyond those that do
     uint64_t cutEvaluations = 0, passes = 0, blocks = 0;

@@ -66,6 +66,7 @@ class CpuBackend final : public render::DrawsAtOnce {
     }
 
     render::HiddenCounts hidden() const override { return frame_.hidden.counts(); }
+    const std::vector<uint32_t>* hiddenNodes() const override { return frame_.hidden.whole(); }
 
   private:
     void draw(const render::RenderRequest& request, render::Image& image) override {
@@ -78,6 +79,7 @@ class CpuBackend final : public render::DrawsAtOnce {
         frame_.hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
         frame_.mayHideNodes = request.mayHideNodes && !request.isOfCasters;
+        frame_.tellsHiddenNodes = request.tellsHiddenNodes;
         frame_.hidden.reset();
         frame_.mirrored = {};
         frame_.isSmoothing = false;  // whatever became of the frame before

@@ -51,8 +51,9 @@ struct Frame {
     bool hasPyramid = false;    ///< the levels above the first are of this frame: push runs
     bool wantsNormals = false;  ///< some pass reads the surface's
     bool mayHideNodes = false;  ///< RenderRequest::mayHideNodes
-    bool hasSmooth = false;     ///< pixels of wide discs take colours and normals from a pyramid of their own ...
-    bool isSmoothing = false;   ///< ... which is being made: of nothing but those discs
+    bool tellsHiddenNodes = false;
+    bool hasSmooth = false;    ///< pixels of wide discs take colours and normals from a pyramid of their own ...
+    bool isSmoothing = false;  ///< ... which is being made: of nothing but those discs
 
     // Plane::visibility. It is clear between frames: resolve resets each entry that it has read.
     HugeBuffer<uint64_t> visibility;

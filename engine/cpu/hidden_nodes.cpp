@@ -118,7 +118,8 @@ std::span<const uint32_t> HiddenNodes::begin(const Frame& frame, bool mayHide) {
     const render::DrawBatch& points = frame.draws->points();
     counts_ = {};
     states_.assign(points.nodes.size(), kDrawn);
-    isTested_ = mayHide && frame.draws->pointBounds.size() == points.nodes.size() && (hasMarks_ || --untilTest_ == 0);
+    isTested_ = mayHide && frame.draws->pointBounds.size() == points.nodes.size() &&
+                (hasMarks_ || frame.tellsHiddenNodes || --untilTest_ == 0);
     if (isTested_ && hasMarks_)
         for (size_t n = 0; n < states_.size(); ++n)
             if (points.nodes[n].count >= kLeastRecords && marks_.has(hashOfNode(points.keys[n], points.instances[n])))
@@ -164,19 +165,26 @@ std::span<const uint32_t> HiddenNodes::rest(Frame& frame, bool areDiscs) {
     const render::DrawBatch& points = frame.draws->points();
     behind_.assign(states_.size(), 0);
     frame.executor.parallelFor(states_.size(), 64, [&](size_t begin, size_t end) {
-        for (size_t n = begin; n < end; ++n)
-            if (points.nodes[n].count >= kLeastRecords)
-                behind_[n] = isBehind(reachOf(frame.constants, points.nodes[n], frame.draws->pointBounds[n], areDiscs,
-                                              frame.hasPyramid))
-                                 ? 1
-                                 : 0;
+        for (size_t n = begin; n < end; ++n) {
+            if (points.nodes[n].count < kLeastRecords) continue;
+            render::NodeBounds bounds = frame.draws->pointBounds[n];
+            const auto isHidden = [&](bool grow) {
+                return isBehind(reachOf(frame.constants, points.nodes[n], bounds, areDiscs || grow, frame.hasPyramid));
+            };
+            if (!isHidden(false)) continue;
+            // What a record stands for is within its error of its disc, and reaches no farther than a disc.
+            bounds.radius = 2 * bounds.radius + bounds.error / std::min(frame.constants.supportScale, 1.0f);
+            behind_[n] = isHidden(true) ? kWholeBehind : kBehind;
+        }
     });
     uint64_t all = 0, behind = 0;
     marks_.clear(states_.size());
+    whole_.clear();
     for (size_t n = 0; n < states_.size(); ++n) {
         const uint32_t count = points.nodes[n].count;
         all += count;
-        if (behind_[n] != 0) {
+        if (behind_[n] == kWholeBehind) whole_.push_back(static_cast<uint32_t>(n));
+        if (behind_[n] != kBefore) {
             behind += count;
             marks_.mark(hashOfNode(points.keys[n], points.instances[n]));
             counts_.nodes += states_[n] == kHeld ? 1 : 0;

@@ -47,8 +47,13 @@ class HiddenNodes {
     std::span<const uint32_t> rest(Frame& frame, bool areDiscs);
 
     const render::HiddenCounts& counts() const { return counts_; }
+    /// Backend::hiddenNodes.
+    const std::vector<uint32_t>* whole() const { return isTested_ ? &whole_ : nullptr; }
     /// Of a frame that does not come to begin().
-    void reset() { counts_ = {}; }
+    void reset() {
+        counts_ = {};
+        isTested_ = false;
+    }
 
   private:
     struct Marks {  ///< of nodes by a hash, two bits of a word: what seems to be marked is only drawn later
@@ -63,8 +68,10 @@ class HiddenNodes {
     bool isBehind(const NodeReach& reach) const;
     void take(const render::DrawBatch& points, uint8_t state, std::vector<uint32_t>& blocks) const;
 
-    enum : uint8_t { kDrawn, kHeld, kSeen };  ///< of a node in this frame
-    std::vector<uint8_t> states_, behind_;    ///< of each node
+    enum : uint8_t { kDrawn, kHeld, kSeen };            ///< of a node in this frame
+    enum : uint8_t { kBefore, kBehind, kWholeBehind };  ///< what is known of its place: with all it stands for, too
+    std::vector<uint8_t> states_, behind_;              ///< of each node
+    std::vector<uint32_t> whole_;                       ///< nodes that are kWholeBehind
     std::vector<uint32_t> blocks_, late_;
     std::vector<uint32_t> farthest_;  ///< of each tile: bits of a depth
     uint32_t columns_ = 0;

@@ -27,6 +27,17 @@ struct TraceSettings {
 Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, const lod::View& view,
                             const TraceSettings& settings, Executor& executor);
 
+/// The full detail of a scene, read once for any number of pictures.
+class FullScene {
+  public:
+    virtual ~FullScene() = default;
+    /// As reference::trace.
+    virtual Result<render::Image> trace(const lod::View& view, const TraceSettings& settings,
+                                        Executor& executor) const = 0;
+};
+/// The stores must outlive what is read of them.
+Result<std::unique_ptr<FullScene>> readFullScene(const std::vector<render::PlacedStore>& placed, Executor& executor);
+
 struct ImageDifference {
     double psnr = 0;               ///< dB over all pixels (colour over black where transparent); infinity if equal
     double foregroundPsnr = 0;     ///< dB where either image has coverage

@@ -226,31 +226,47 @@ bool meetsTriangle(const dvec3& a, const dvec3& b, const dvec3& c, bool isTwoSid
     return true;
 }
 
-class Tracer {
-  public:
-    Tracer(const std::vector<render::PlacedStore>& placed, const lod::View& view, const TraceSettings& settings)
-        : placed_(placed), view_(view), settings_(settings) {}
+/// Where the stores of a scene stand, and what each draws: those that look alike are one.
+struct TracedScene {
+    std::vector<render::PlacedStore> placed;
+    std::map<std::pair<const lod::Store*, size_t>, TracedStore> stores;
+    std::vector<const TracedStore*> places;
 
-    Result<void> prepare() {
-        std::vector<Box> boxes;
-        for (const render::PlacedStore& p : placed_) {
+    Result<void> read(Executor& executor) {
+        std::vector<std::pair<const render::PlacedStore*, TracedStore*>> toRead;
+        for (const render::PlacedStore& p : placed) {
             // A store in other colours is another one.
             const bool isOwn = p.colour.mode == lod::ColourMode::own;
-            auto [at, isNew] = stores_.try_emplace({p.store.get(), isOwn ? 0 : places_.size() + 1});
-            if (isNew) STIPPLE_TRY(readStore(p, at->second));
-            at->second.textures.source = 0;
-            places_.push_back(&at->second);
-            const Box own = at->second.tree.bounds();
+            auto [at, isNew] = stores.try_emplace({p.store.get(), isOwn ? 0 : places.size() + 1});
+            if (isNew) toRead.emplace_back(&p, &at->second);
+            places.push_back(&at->second);
+        }
+        std::vector<Result<void>> results(toRead.size());
+        executor.parallelFor(toRead.size(), 1, [&](size_t begin, size_t end) {
+            for (size_t k = begin; k < end; ++k) results[k] = readStore(*toRead[k].first, *toRead[k].second);
+        });
+        for (const Result<void>& result : results) STIPPLE_TRY(result);
+        return {};
+    }
+};
+
+class Tracer {
+  public:
+    Tracer(const TracedScene& scene, const lod::View& view, const TraceSettings& settings)
+        : placed_(scene.placed), view_(view), settings_(settings), places_(scene.places) {
+        std::vector<Box> boxes;
+        for (size_t p = 0; p < placed_.size(); ++p) {
+            const lod::Instance& place = placed_[p].place;
+            const Box own = places_[p]->tree.bounds();
             boxes.emplace_back();
             for (int k = 0; k < 8; ++k) {
                 const dvec3 corner((k & 1) != 0 ? own.hi.x : own.lo.x, (k & 2) != 0 ? own.hi.y : own.lo.y,
                                    (k & 4) != 0 ? own.hi.z : own.lo.z);
-                boxes.back().add(p.place.translation + p.place.rotation * (p.place.scale * corner) - view_.eye);
+                boxes.back().add(place.translation + place.rotation * (place.scale * corner) - view_.eye);
             }
         }
         tree_ = BoxTree(boxes);
         render::makeRayList(view_, settings_.draw, draws_);
-        return {};
     }
 
     /// Depth of what one ray meets first, and its normal towards the eye (world space); false if it meets nothing.
@@ -483,8 +499,7 @@ class Tracer {
     const lod::View& view_;
     const TraceSettings& settings_;
     const bool castsShadows_ = render::isRequested("shadow", settings_.draw);
-    std::map<std::pair<const lod::Store*, size_t>, TracedStore> stores_;
-    std::vector<const TracedStore*> places_;
+    const std::vector<const TracedStore*>& places_;
     BoxTree tree_;  ///< of the places, relative to the eye
     render::DrawList draws_;
 };
@@ -495,12 +510,9 @@ dvec3 missedLight(const render::DrawSettings& draw, const lod::View& view, const
     return lightFrom(*draw.backdrop, toMap(world, draw.worldUp), view.isOrthographic ? 0 : 1 / (view.focalPixels * n));
 }
 
-}  // namespace
-
-Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, const lod::View& view,
-                            const TraceSettings& settings, Executor& executor) {
-    Tracer tracer(placed, view, settings);
-    STIPPLE_TRY(tracer.prepare());
+Result<render::Image> traceScene(const TracedScene& scene, const lod::View& view, const TraceSettings& settings,
+                                 Executor& executor) {
+    const Tracer tracer(scene, view, settings);
     render::Image image;
     image.width = view.width;
     image.height = view.height;
@@ -543,6 +555,29 @@ Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, cons
     });
     if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted");
     return image;
+}
+
+struct TracedFullScene final : FullScene {
+    TracedScene scene;
+    Result<render::Image> trace(const lod::View& view, const TraceSettings& settings,
+                                Executor& executor) const override {
+        return traceScene(scene, view, settings, executor);
+    }
+};
+
+}  // namespace
+
+Result<std::unique_ptr<FullScene>> readFullScene(const std::vector<render::PlacedStore>& placed, Executor& executor) {
+    auto full = std::make_unique<TracedFullScene>();
+    full->scene.placed = placed;
+    STIPPLE_TRY(full->scene.read(executor));
+    return full;
+}
+
+Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, const lod::View& view,
+                            const TraceSettings& settings, Executor& executor) {
+    STIPPLE_ASSIGN(const auto full, readFullScene(placed, executor));
+    return full->trace(view, settings, executor);
 }
 
 }  // namespace stipple::reference

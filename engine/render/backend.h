@@ -37,6 +37,8 @@ struct RenderRequest {
     bool isOfCasters = false;
     /// Points that are hidden behind others need not be drawn, as far as that changes no bit of the picture.
     bool mayHideNodes = false;
+    /// Which of them are hidden is wanted (Backend::hiddenNodes), also where that makes nothing faster.
+    bool tellsHiddenNodes = false;
     /// The picture is to be shown by the device that draws it (gpu::Window): where there is such a device it is not
     /// copied to the host, and read has none.
     bool staysOnDevice = false;
@@ -93,6 +95,9 @@ class Backend : public streaming::ChunkSink {
     virtual BackendResources resources() const { return {}; }
     /// Of the frame that was read or finished last; nothing of backends that draw all that is handed in.
     virtual HiddenCounts hidden() const { return {}; }
+    /// Likewise the nodes of points, as numbers in its draw list, that are hidden with all that they stand for: no
+    /// pixel would change if they were refined, either. Null: that was not looked for.
+    virtual const std::vector<uint32_t>* hiddenNodes() const { return nullptr; }
     /// Of the frame that was read or finished last.
     virtual const std::vector<PassTime>& passTimes() const = 0;
 

@@ -66,6 +66,7 @@ struct DrawBatch {
 struct NodeBounds {
     std::array<uint16_t, 3> low{0, 0, 0}, high{65535, 65535, 65535};  ///< steps of its lattice, both included
     float radius = 0;  ///< no disc is larger: world units, without what the mode adds
+    float error = 0;   ///< nothing that its records stand for is farther from them: world units
 };
 
 /// Clusters of one chunk of a mesh, as many blocks of the batch of triangles.

@@ -231,11 +231,14 @@ Result<uint64_t> drawNodes(FrameState& state, const lod::Cut& cut, const lod::Vi
     request.staysOnDevice = settings.staysOnDevice;
     // (What is hidden within a layer is another picture's each time: nothing is known of it.)
     request.mayHideNodes = settings.mayHideNodes && settings.draw.layer == nullptr && !settings.draw.isBlended;
+    request.tellsHiddenNodes = settings.tellsHiddenNodes;
+    if (request.mayHideNodes) addErrors(state.hierarchies, state.instances, state.draws);
     count(request.passes, requestedEffects(state.draws.effectsOfScene, settings.draw), state);
     STIPPLE_TRY(drawPicture(state, request));
     const HiddenCounts hidden = state.backend->hidden();
     state.counters.nodesHidden += hidden.nodes;
     state.counters.recordsHidden += hidden.records;
+    if (request.mayHideNodes) state.unrefined.take(*state.backend, state.draws);
     return request.passes.size();
 }
 
@@ -297,8 +300,10 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     uint64_t passes = 0;
     state.effects = {};
     state.counters.nodesHidden = state.counters.recordsHidden = 0;
+    state.unrefined.forget();
     if (hasLayers(state, view, settings)) {
         STIPPLE_ASSIGN(passes, drawLayered(state, view, settings));
+        state.unrefined.forget();  // through glass other things are seen
         addTone(settings.draw, state.effects);
     } else if (isMetered(settings.draw)) {
         STIPPLE_ASSIGN(passes, drawMetered(state, view, settings));
@@ -341,13 +346,18 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
 
 namespace {
 
+bool leavesHiddenCoarse(const FrameSettings& settings) {
+    return settings.leavesHiddenCoarse && settings.mayHideNodes && settings.budgets.records != lod::Budgets{}.records;
+}
+
 /// From `start` on (seconds) it counts as time of the frame.
 Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings& settings, double start, bool asks) {
     streaming::Streamer& streamer = *state.streamer;
     const double cutStart = nowSeconds();
-    lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
-    const double cutEnd = nowSeconds();
     FrameSettings shaded = settings;
+    if (leavesHiddenCoarse(settings)) shaded.budgets.unrefined = state.unrefined.nodes();
+    lod::selectCut(state.scene(), streamer.residency(), view, shaded.budgets, state.scratch, state.cut);
+    const double cutEnd = nowSeconds();
     constexpr uint64_t kMostModes = 16;
     shaded.draw.frameTag = (streamer.counters().uploads + streamer.counters().evictions) * kMostModes +
                            static_cast<uint64_t>(settings.mode);
@@ -359,13 +369,27 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     return drawCut(state, view, shaded, start, (cutEnd - cutStart) * 1e3);
 }
 
+/// After a picture of its own: true if the next one of the view leaves other nodes coarse.
+bool learnHidden(FrameState& state, const FrameSettings& settings) {
+    const bool isShort = state.cut.tauTarget > 1.001 * settings.budgets.errorPixels && !state.cut.truncated;
+    const bool isOther = leavesHiddenCoarse(settings) && state.unrefined.learn(state.cut, isShort);
+    state.counters.nodesLeftCoarse = leavesHiddenCoarse(settings) ? state.unrefined.drawn() : 0;
+    state.counters.nodesSeenCoarse = leavesHiddenCoarse(settings) ? state.unrefined.seen() : 0;
+    return isOther;
+}
+
 }  // namespace
 
 Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings) {
     const double start = nowSeconds();
     state.streamer->collect();
     state.streamer->upload();
-    return draw(state, view, settings, start, true);
+    state.unrefined.beginView(view);
+    FrameSettings asked = settings;
+    asked.tellsHiddenNodes = !state.unrefined.nodes().empty();  // so that what is left coarse is looked at
+    STIPPLE_TRY(draw(state, view, asked, start, true));
+    learnHidden(state, settings);
+    return {};
 }
 
 Result<void> renderResident(FrameState& state, const lod::View& view, const FrameSettings& settings) {
@@ -377,7 +401,7 @@ namespace {
 /// Bodies from behind, what effects look at: makes state.plan, which is of `view` alone, that of all views together.
 void planFurtherViews(FrameState& state, const lod::View& view, const FrameSettings& settings,
                       std::span<const std::pair<uint32_t, uint32_t>> barred) {
-    std::vector<lod::ViewRequest> views{{view, settings.budgets.errorPixels}};
+    std::vector<lod::ViewRequest> views{{view, settings.budgets.errorPixels, false, settings.budgets.unrefined}};
     addRequestsFromBehind(state, view, settings, views);
     for (const Effect* e : effects())
         if (e->before != nullptr) e->before->addViews(state, view, settings, views);
@@ -400,9 +424,8 @@ Result<void> await(const lod::ResidentPlan& plan, streaming::Streamer& streamer)
     }
 }
 
-}  // namespace
-
-Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+/// Waits for what planResident says of the view, and draws it: true if nothing is missing.
+Result<bool> drawComplete(FrameState& state, const lod::View& view, const FrameSettings& settings) {
     streaming::Streamer& streamer = *state.streamer;
     streamer.wait();
     streamer.collect();
@@ -426,6 +449,23 @@ Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const
     }
     STIPPLE_TRY(renderResident(state, view, settings));
     return state.cut.wanted.empty();
+}
+
+}  // namespace
+
+Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    state.unrefined.clear();
+    state.unrefined.beginView(view);
+    constexpr int kMostPictures = 8;  // each but the first few refines something again for good
+    for (int picture = 1;; ++picture) {
+        FrameSettings asked = settings;
+        asked.tellsHiddenNodes = leavesHiddenCoarse(settings);
+        if (asked.tellsHiddenNodes) asked.budgets.unrefined = state.unrefined.nodes();
+        STIPPLE_ASSIGN(const bool isComplete, drawComplete(state, view, asked));
+        if (!learnHidden(state, settings)) return isComplete;
+        if (picture + 1 >= kMostPictures) state.unrefined.clear();  // and nothing is left coarse
+        if (picture == kMostPictures) return isComplete;
+    }
 }
 
 }  // namespace stipple::render

@@ -9,6 +9,7 @@
 #include "engine/base/counters.h"
 #include "engine/render/backend.h"
 #include "engine/render/disc_sizes.h"
+#include "engine/render/unrefined.h"
 #include "lod/cut/views.h"
 #include "lod/store/colour.h"
 #include "lod/store/store.h"
@@ -30,8 +31,12 @@ struct FrameSettings {
     Mode mode = Mode::pullpush;
     DrawSettings draw;
     bool wantDepthAndNormal = false;
-    bool staysOnDevice = false;  ///< see RenderRequest: FrameState::onDevice, and no image
-    bool mayHideNodes = true;    ///< see RenderRequest: it changes no picture
+    bool staysOnDevice = false;     ///< see RenderRequest: FrameState::onDevice, and no image
+    bool mayHideNodes = true;       ///< see RenderRequest: it changes no picture
+    bool tellsHiddenNodes = false;  ///< see RenderRequest
+    /// Where the budget of records does not do, what is hidden is not refined (unrefined.h): the error of what is seen
+    /// is smaller for it. Until a picture is complete that may take several.
+    bool leavesHiddenCoarse = false;
 };
 
 /// Everything a frame walks through, owned in one place.
@@ -58,6 +63,7 @@ struct FrameState {
     std::optional<Ticket> onDevice;  ///< of the last frame, if its picture stays there
     FrameCounters counters;
     EffectsOfFrame effects;
+    Unrefined unrefined;
 
     lod::CutScene scene() const { return {hierarchies, instances, groups}; }
 };

@@ -55,7 +55,8 @@ void cutFromBehind(FrameState& state, uint32_t instance, const lod::View& back, 
     lod::Instance alone = state.instances[instance];
     alone.proxy = alone.group = lod::Instance::kNone;
     alone.isDriven = false;
-    lod::selectCut({state.hierarchies, {&alone, 1}, {}}, state.streamer->residency(), back, budgets, l.backScratch,
+    const lod::Budgets ofOne{budgets.errorPixels, budgets.records};
+    lod::selectCut({state.hierarchies, {&alone, 1}, {}}, state.streamer->residency(), back, ofOne, l.backScratch,
                    l.backCut);
     for (lod::CutDraw& d : l.backCut.draw) d.instance = instance;
     for (lod::CutMeshDraw& d : l.backCut.meshDraw) d.instance = instance;

@@ -214,7 +214,7 @@ const ShadowFrame::Kept* keptOf(const ShadowFrame& frame, const ShadowView& of, 
 std::vector<size_t> cutCasters(FrameState& state, const lod::View& view, const FrameSettings& settings,
                                std::span<const ShadowView> views, const CasterWishes& wishes, bool mayKeep) {
     ShadowFrame& frame = *state.shadows;
-    std::vector<lod::ViewRequest> requests{{view, settings.budgets.errorPixels}};
+    std::vector<lod::ViewRequest> requests{{view, settings.budgets.errorPixels, false, settings.budgets.unrefined}};
     std::vector<size_t> asked(views.size());
     for (size_t v = 0; v < views.size(); ++v) {
         if (mayKeep && keptOf(frame, viewInUnits(views[v], frame.units), wishes) != nullptr) continue;

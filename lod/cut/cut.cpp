@@ -172,13 +172,21 @@ void truncate(uint64_t budget, Cut& cut) {
     cut.counters.trianglesDrawn = triangles;
 }
 
+/// So that nothing below the node is looked at, and what is drawn of it counts as exact.
+void allowAnyError(const CutFrame& frame, const PlacedNode& n) {
+    const Hierarchy& h = frame.hierarchyOf(n.instance);
+    const CutScratch::Slot& slot = slotOf(frame, n.instance);
+    if (epsilonOf(frame, h, slot, n.node, kInside) != kCulled)
+        frame.scratch.allowed[slot.first + n.node].epsilon = kAnyError;
+}
+
 double tauAt(int step, int target, double tau) {
     return step == target ? tau : std::exp2(static_cast<double>(step) / kStepsPerOctave);
 }
 
 }  // namespace
 
-void beginCut(const CutFrame& frame, Cut& cut) {
+void beginCut(const CutFrame& frame, std::span<const PlacedNode> unrefined, Cut& cut) {
     cut.draw.clear();
     cut.meshDraw.clear();
     cut.wanted.clear();
@@ -193,6 +201,7 @@ void beginCut(const CutFrame& frame, Cut& cut) {
     if (scratch.slotOf.size() != frame.scene.instances.size()) findDrivers(frame);
     scratch.isReady.clear();
     for (const InstanceGroup& group : frame.scene.groups) scratch.isReady.push_back(isReady(frame, group) ? 1 : 0);
+    for (const PlacedNode& n : unrefined) allowAnyError(frame, n);
 }
 
 void emitCutAt(const CutFrame& frame, const PlannedStep& step, const Target& target, uint64_t budget, Cut& cut) {
@@ -220,7 +229,7 @@ void emitCutAt(const CutFrame& frame, const PlannedStep& step, const Target& tar
 void selectCut(const CutScene& scene, const Residency& residency, const View& view, const Budgets& budgets,
                CutScratch& scratch, Cut& cut) {
     const CutFrame frame{scene, residency, view, scratch};
-    beginCut(frame, cut);
+    beginCut(frame, budgets.unrefined, cut);
     const Target target(budgets.errorPixels);
     const auto cost = [&](int step, uint64_t most, Counted counted) { return costOfCut(frame, step, most, counted); };
     const PlannedStep step = planStep(cost, target.step, budgets.records, cut.counters);

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <deque>
 #include <glm/glm.hpp>
@@ -35,6 +36,7 @@ struct View {
     glm::dvec2 shift{0};
     /// Where that ray is in the picture, px from its upper left corner.
     glm::dvec2 principal() const { return 0.5 * glm::dvec2(width, height) + shift; }
+    bool operator==(const View&) const = default;
 };
 
 /// A placed hierarchy. world = translation + rotation * (scale * (origin + unit * lattice)).
@@ -75,9 +77,17 @@ struct Residency {
     std::span<const std::vector<uint8_t>> drawable;
 };
 
+/// A node where it is placed: a node of the hierarchy of an instance.
+struct PlacedNode {
+    uint32_t instance = 0, node = 0;
+    auto operator<=>(const PlacedNode&) const = default;
+};
+
 struct Budgets {
     double errorPixels = 1;                                   ///< tau asked for
     uint64_t records = std::numeric_limits<uint64_t>::max();  ///< records and triangles drawn at most
+    /// Of octrees, what needs no detail: nodes that are not refined, whatever their error, which no tau counts then.
+    std::span<const PlacedNode> unrefined{};
 };
 
 /// Of a payload of points or curves.

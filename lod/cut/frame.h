@@ -104,8 +104,8 @@ struct PlannedStep {
     int planned = 0, drawn = 0;
 };
 
-/// Empties `cut`, and begins a frame of the view's scratch.
-void beginCut(const CutFrame& frame, Cut& cut);
+/// Empties `cut`, and begins a frame of the view's scratch. `unrefined`: Budgets::unrefined.
+void beginCut(const CutFrame& frame, std::span<const PlacedNode> unrefined, Cut& cut);
 /// Records and triangles of the whole cut at `step`; stops counting above the budget.
 CutCost costOfCut(const CutFrame& frame, int step, uint64_t budget, Counted counted);
 void emitCutAt(const CutFrame& frame, const PlannedStep& step, const Target& target, uint64_t budget, Cut& cut);

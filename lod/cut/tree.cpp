@@ -96,7 +96,8 @@ void walkTree(const Payloads& of, const CutFrame& frame, uint32_t i, int step, c
         }
         const uint32_t parentCode =
             index == 0 ? ErrorScale::kLargest : std::min(codeOf(slot, parentEpsilon, step), largest);
-        const uint32_t code = std::min(codeOf(slot, epsilon, step), largest);
+        const uint32_t code =
+            epsilon == kAnyError ? ErrorScale::kLargest : std::min(codeOf(slot, epsilon, step), largest);
         if (!use(OnTheWay{index, epsilon, parentEpsilon, code, parentCode})) return;
         if (of.errorCode(index) <= code || !isReached(index) || !h.hasChildrenOf(node)) continue;
         const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));

@@ -11,8 +11,9 @@
 namespace stipple::lod {
 
 inline constexpr int32_t kCulled = std::numeric_limits<int32_t>::min();
-inline constexpr int32_t kInside = -1'000'000;  // the eye is inside the sphere: only exact records are fine enough
-inline constexpr int kStepsPerOctave = 32;      // resolution of tau; error codes have 8
+inline constexpr int32_t kInside = -1'000'000;   // the eye is inside the sphere: only exact records are fine enough
+inline constexpr int32_t kAnyError = 1'000'000;  // of a node that is not refined
+inline constexpr int kStepsPerOctave = 32;       // resolution of tau; error codes have 8
 inline constexpr int kLargestTauStep = 40 * kStepsPerOctave;
 
 inline LocalView makeLocalView(const Hierarchy& h, const Instance& instance, const View& view) {

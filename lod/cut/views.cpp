@@ -73,7 +73,7 @@ void selectCuts(const CutScene& scene, const Residency& residency, std::span<con
         Rank& rank = ranks.at(views[v].isSecondary ? 1 : 0);
         rank.frames.push_back({scene, residency, views[v].view, scratch.views[v]});
         rank.tau = std::min(rank.tau, views[v].errorPixels);
-        beginCut(rank.frames.back(), out.views[v]);
+        beginCut(rank.frames.back(), views[v].unrefined, out.views[v]);
     }
     // What secondary views cannot do without is set aside; what primary ones leave is theirs.
     CutCounters evaluations;

@@ -15,7 +15,8 @@ namespace stipple::lod {
 struct ViewRequest {
     View view;
     double errorPixels = 1;  ///< tau asked for; of primary views the smallest counts for all, and so of secondary ones
-    bool isSecondary = false;  ///< seen by nobody: what it decides may be coarser
+    bool isSecondary = false;                 ///< seen by nobody: what it decides may be coarser
+    std::span<const PlacedNode> unrefined{};  ///< as Budgets has them
 };
 
 /// Reused between frames: a scratch a view.

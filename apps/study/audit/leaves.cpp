@@ -76,12 +76,34 @@ struct Leaves {
     }
 };
 
+/// Records of leaves, each of which is a shape or more: no less than add() makes, without a chunk being read.
+uint64_t leastShapesOf(const lod::Hierarchy& h) {
+    uint64_t least = 0;
+    if (h.isGraph) return least;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n)
+        if (h.nodes[n].isLeaf())
+            h.forEachPayload(n, [&](uint32_t index) {
+                const lod::Payload& payload = h.payload(index);
+                if (payload.kind == lod::Kind::points || payload.kind == lod::Kind::curves) least += payload.records;
+            });
+    return least;
+}
+
+Error tooMany(size_t most, const lod::Store& store) {
+    return {ErrorKind::budget, fmt::format("has more than {} shapes in its leaves", most), store.path, {}};
+}
+
 }  // namespace
 
 Result<FullShapes> leavesOf(std::span<const render::PlacedStore> placed, size_t most, bool withPatches) {
     FullShapes shapes;
+    uint64_t least = 0;
     for (const render::PlacedStore& p : placed) {
         STIPPLE_TRY(lod::readWholeTable(*p.store));
+        least += leastShapesOf(p.store->hierarchy);
+        if (least > most) return tl::unexpected(tooMany(most, *p.store));
+    }
+    for (const render::PlacedStore& p : placed) {
         const lod::Hierarchy& h = p.store->hierarchy;
         Leaves leaves{*p.store, p.place, shapes, withPatches};
         for (uint32_t n = 0; n < h.nodes.size(); ++n) {
@@ -91,9 +113,7 @@ Result<FullShapes> leavesOf(std::span<const render::PlacedStore> placed, size_t 
                 if (added) added = leaves.add(n, index);
             });
             STIPPLE_TRY(added);
-            if (shapes.size() > most)
-                return fail(ErrorKind::budget, fmt::format("has more than {} shapes in its leaves", most),
-                            p.store->path);
+            if (shapes.size() > most) return tl::unexpected(tooMany(most, *p.store));
         }
     }
     return shapes;

@@ -23,6 +23,8 @@ struct Run {
     StudyResult& result;
     std::vector<std::unique_ptr<SceneDrawer>> drawers;  ///< by scene
     std::vector<uint8_t> isMeasured;                    ///< cells whose errors are there
+    std::unique_ptr<reference::FullScene> full{};       ///< of scene fullOf, for rays
+    uint32_t fullOf = 0;
 
     Result<SceneDrawer*> drawerOf(uint32_t scene) {
         if (!drawers[scene]) {
@@ -61,9 +63,19 @@ std::optional<FullDetail> fullDetailOf(Run& run, uint32_t scene) {
     return {};
 }
 
-Result<render::Image> traced(const Run& run, uint32_t scene, const lod::View& view, uint32_t samples) {
-    const reference::TraceSettings settings{samples, run.scenes[scene].draw};
-    return reference::trace(run.scenes[scene].placed, view, settings, run.host.executor);
+/// Views come scene by scene.
+Result<const reference::FullScene*> fullSceneOf(Run& run, uint32_t scene) {
+    if (!run.full || run.fullOf != scene) {
+        run.full.reset();
+        STIPPLE_ASSIGN(run.full, reference::readFullScene(run.scenes[scene].placed, run.host.executor));
+        run.fullOf = scene;
+    }
+    return run.full.get();
+}
+
+Result<render::Image> traced(Run& run, uint32_t scene, const lod::View& view, uint32_t samples) {
+    STIPPLE_ASSIGN(const reference::FullScene* const full, fullSceneOf(run, scene));
+    return full->trace(view, {samples, run.scenes[scene].draw}, run.host.executor);
 }
 
 /// Whether truths are true: once for each scene and size.
@@ -95,7 +107,8 @@ Result<void> measureView(Run& run, uint32_t first, const FullDetail* full, Scene
     STIPPLE_ASSIGN(SceneDrawer* const drawer, run.drawerOf(at.scene));
     const bool isFirst = scene.views[at.view].number == 0 && at.size == 0;
     if (isFirst) {
-        STIPPLE_ASSIGN(truth.light, lightTruthOf(scene, truth.view, run.host.executor));
+        STIPPLE_ASSIGN(const reference::FullScene* const detail, fullSceneOf(run, at.scene));
+        STIPPLE_ASSIGN(truth.light, lightTruthOf(scene.draw, *detail, truth.view, run.host.executor));
     }
     const CellTools tools{*drawer, isFirst ? &oracle : nullptr, full, run.host.executor, truth};
     render::Image leaves;
@@ -153,6 +166,7 @@ Result<void> measureErrorsOfAll(Run& run) {
         STIPPLE_TRY(run.host.say("errors", first, cells));
         STIPPLE_TRY(measureView(run, first, full ? &*full : nullptr, *oracle, journal, truths));
     }
+    run.full.reset();
     return {};
 }
 

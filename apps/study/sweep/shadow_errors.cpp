@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "apps/study/audit/shadows.h"
-#include "engine/reference/reference.h"
 
 namespace stipple::study {
 namespace {
@@ -20,16 +19,15 @@ render::DrawSettings settingsOf(const render::DrawSettings& scene, size_t light,
 
 }  // namespace
 
-Result<std::optional<LightTruth>> lightTruthOf(const StudyScene& scene, const lod::View& view, Executor& executor) {
-    const std::vector<render::WorldLight>& lights = scene.draw.lights;
+Result<std::optional<LightTruth>> lightTruthOf(const render::DrawSettings& draw, const reference::FullScene& full,
+                                               const lod::View& view, Executor& executor) {
+    const std::vector<render::WorldLight>& lights = draw.lights;
     const auto casts = [](const render::WorldLight& l) { return l.castsShadow && l.kind != shared::kLightPoint; };
     const auto caster = std::find_if(lights.begin(), lights.end(), casts);
-    if (caster == lights.end() || !scene.draw.lit) return std::optional<LightTruth>();
+    if (caster == lights.end() || !draw.lit) return std::optional<LightTruth>();
     LightTruth truth;
     truth.light = static_cast<size_t>(caster - lights.begin());
-    const auto traced = [&](Of of) {
-        return reference::trace(scene.placed, view, {1, settingsOf(scene.draw, truth.light, of)}, executor);
-    };
+    const auto traced = [&](Of of) { return full.trace(view, {1, settingsOf(draw, truth.light, of)}, executor); };
     STIPPLE_ASSIGN(const render::Image with, traced(Of::all));
     STIPPLE_ASSIGN(const render::Image dark, traced(Of::dark));
     STIPPLE_ASSIGN(truth.open, traced(Of::open));
