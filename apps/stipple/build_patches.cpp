@@ -90,13 +90,13 @@ Result<lod::BuildReport> ofMeshes(const std::vector<std::string>& files, const s
 struct Looks {
     std::vector<scene::DecodedImage> images;
     uint64_t imageBytes = 0, identity = 0;
-    lod::PlaceLooks looks;  ///< empty: all has one material, and no textures
+    lod::PlaceLooks looks;  ///< empty: all has one material, no textures, and is lit by others' light alone
     lod::TextureDetail detail;
 };
 
 Result<Looks> looksOf(const scene::Scene& scene, const scene::MaterialList& materials, uint64_t memoryBytes) {
     Looks out;
-    if (!scene::hasTextures(scene) && materials.list.size() < 2) return out;
+    if (!scene::hasTextures(scene) && materials.list.size() < 2 && !scene::hasLight(scene)) return out;
     STIPPLE_ASSIGN(out.images, scene::decodeImages(scene, memoryBytes, printLine));
     for (const scene::DecodedImage& image : out.images) {
         const uint64_t bytes = image.rgba.size() * sizeof(uint32_t);
@@ -105,6 +105,9 @@ Result<Looks> looksOf(const scene::Scene& scene, const scene::MaterialList& mate
     }
     for (const lod::PointMaterial& m : materials.list)
         for (const char c : lod::identityOf(m)) out.identity = out.identity * 31 + static_cast<unsigned char>(c);
+    for (const scene::Material& m : scene.materials)
+        for (const char c : fmt::format("{},{},{},{}", m.isUnlit, m.emissive.x, m.emissive.y, m.emissive.z))
+            out.identity = out.identity * 31 + static_cast<unsigned char>(c);
     out.looks = scene::placeLooks(scene, out.images);
     out.detail = scene::textureDetail(scene, out.images);
     return out;
@@ -121,10 +124,12 @@ Result<lod::BuildReport> ofScene(const std::string& input, const std::string& ou
     STIPPLE_ASSIGN(const Looks looks, looksOf(scene, materials, settings.limits.memoryBytes));
     settings.looks = looks.looks;
     settings.maps.detail = looks.detail;
+    settings.maps.detail.hasLight = looks.detail.hasLight && !build.material;  // which says how all of it is lit
     settings.looksIdentity = looks.identity;
     settings.readerShare = static_cast<double>(looks.imageBytes) / static_cast<double>(settings.limits.memoryBytes);
     settings.limits.memoryBytes -= looks.imageBytes;
-    if (!build.material && !(materials.list.size() == 1 && materials.list.front() == lod::PointMaterial{}))
+    if (!build.material && (settings.maps.detail.hasLight ||
+                            !(materials.list.size() == 1 && materials.list.front() == lod::PointMaterial{})))
         settings.description.pointMaterials = materials.list;
     if (!settings.looks)
         source.read = [plain = source.read, &scene](const lod::MeshSource::Take& take) {

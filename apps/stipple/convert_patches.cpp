@@ -84,6 +84,7 @@ Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& no
             out.scene = std::make_unique<scene::Scene>(std::move(scene));
             out.looks = scene::placeLooks(*out.scene, out.images);
             out.materials = scene::materialList(*out.scene).list;
+            out.isUnlit = scene::isAllUnlit(*out.scene);
             if (scene::hasTextures(*out.scene))
                 notes.emplace_back(
                     "textures become colours and normals of samples; --patch-samples N for more of them");

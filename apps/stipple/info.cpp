@@ -129,7 +129,7 @@ Result<nlohmann::json> mapInfo(const lod::Store& store) {
     const lod::Hierarchy& h = store.hierarchy;
     std::map<uint32_t, uint64_t> payloads;  // by texels along an edge of a cell
     uint64_t bytes = 0, inMemory = 0;
-    bool hasNormals = false;
+    bool hasNormals = false, hasLight = false;
     std::array<uint8_t, lod::kPatchHeadBytes> head{};
     for (uint32_t n = 0; n < h.nodes.size(); ++n) {
         Result<void> read;
@@ -138,6 +138,7 @@ Result<nlohmann::json> mapInfo(const lod::Store& store) {
             if (p.maps == 0 || !read) return;
             ++payloads[1u << (p.maps & shared::kMapDensity)];
             hasNormals = hasNormals || (p.maps & shared::kMapNormals) != 0;
+            hasLight = hasLight || (p.maps & shared::kMapLight) != 0;
             inMemory += uint64_t{p.records} * shared::mapWords(p.maps) * sizeof(uint32_t);
             const size_t count = std::min<size_t>(head.size(), p.chunkBytes);
             read = store.file->readAt(p.chunkOffset, head.data(), count);
@@ -148,8 +149,11 @@ Result<nlohmann::json> mapInfo(const lod::Store& store) {
     if (payloads.empty()) return nlohmann::json();
     nlohmann::json texels = nlohmann::json::object();
     for (const auto& [k, count] : payloads) texels[std::to_string(k)] = count;
-    return nlohmann::json{
-        {"texels", texels}, {"bytes", bytes}, {"bytes_with_mips", inMemory}, {"has_normals", hasNormals}};
+    return nlohmann::json{{"texels", texels},
+                          {"bytes", bytes},
+                          {"bytes_with_mips", inMemory},
+                          {"has_normals", hasNormals},
+                          {"has_light", hasLight}};
 }
 
 /// What is told of a level: of leaves of patches their distance from the source.
@@ -250,8 +254,9 @@ void printMaps(const nlohmann::json& maps) {
     std::string texels;
     for (const auto& [k, count] : maps["texels"].items())
         texels += fmt::format("{}{} in {}", texels.empty() ? "" : ", ", k, counted(count.get<uint64_t>(), "node"));
-    fmt::print("  maps          texels an edge of a cell, at most: {}; colours{}; {}, {} in memory with mips\n", texels,
-               maps["has_normals"].get<bool>() ? " and normals" : "", humanBytes(maps["bytes"].get<uint64_t>()),
+    fmt::print("  maps          texels an edge of a cell, at most: {}; colours{}{}; {}, {} in memory with mips\n",
+               texels, maps["has_normals"].get<bool>() ? ", normals" : "",
+               maps["has_light"].get<bool>() ? ", light" : "", humanBytes(maps["bytes"].get<uint64_t>()),
                humanBytes(maps["bytes_with_mips"].get<uint64_t>()));
 }
 

@@ -69,6 +69,7 @@ struct Frame {
     std::vector<TextureSet> textureSets;
     /// Are there triangles or patches?
     bool hasTriangles = false, hasEmissive = false, hasCurves = false;
+    bool hasLitPatches = false;  ///< patches that send light, or are shown as they are
 
     HiddenNodes hidden;  ///< which blocks of points are drawn, and when
 

@@ -139,6 +139,7 @@ struct PatchSource {
     const shared::DrawMesh* mesh;  ///< its patch
     uint32_t level;
     float errorPixels;
+    bool hasLight = false;                    ///< of its own, in the map, and it is shown
     uint32_t material = shared::kPlainPoint;  ///< of all samples, packed, unless ...
     const uint16_t* materials = nullptr;      ///< ... each has its own
     const uint32_t* map = nullptr;            ///< the block's, if it has one
@@ -181,7 +182,7 @@ struct LargeSink {
     void (*keep)(void* context, const LargeTriangle& triangle);
 };
 
-/// Planes over the whole image, only where triangles are drawn; `emissive` only where a material emits.
+/// Planes over the whole image, only where triangles are drawn; `emissive` only where something sends light.
 struct SurfacePlanes {
     uint32_t* surface;
     uint32_t* emissive;       ///< packColour

@@ -33,9 +33,45 @@ MapLook mapLook(const uint32_t* map, uint32_t code, float i, float j, float cell
     return out;
 }
 
+/// What a place sends by itself, and how much of it is not lit.
+struct MapLight {
+    vec3 emission;  ///< linear
+    float unlit;
+};
+
+MapLight mapLight(const uint32_t* map, uint32_t code, float i, float j, float cells) {
+    const uint32_t density = code & kMapDensity, first = mapLightFirst(code);
+    const MapLod lod = mapLod(density, cells);
+    MapLight out{vec3(0, 0, 0), 0};
+    for (uint32_t l = 0; l < 2; ++l) {
+        const float share = l == 0 ? 1.0f - lod.share : lod.share;
+        if (!(share > 0.0f)) continue;
+        const MapTap tap = mapTap(density, l == 0 ? lod.level : lod.next, i, j);
+        for (uint32_t c = 0; c < 4; ++c) {
+            const float w = share * mapWeight(tap, c);
+            const uint32_t word = map[first + mapTexelOf(tap, c)];
+            const vec3 e = mapEmission(word);
+            out.emission = vec3(out.emission.x + w * e.x, out.emission.y + w * e.y, out.emission.z + w * e.z);
+            out.unlit += (word & kMapUnlit) != 0 ? w : 0.0f;
+        }
+    }
+    return out;
+}
+
+/// Of one pixel.
+void showLight(const PatchSource& source, float i, float j, float cells, size_t k, MaterialRow& out) {
+    const MapLight light = mapLight(source.map, source.block->map, i, j, cells);
+    out.emissionR[k] = light.emission.x;
+    out.emissionG[k] = light.emission.y;
+    out.emissionB[k] = light.emission.z;
+    out.flags[k] = light.unlit >= 0.5f ? kPixelUnlit : 0u;
+}
+
 /// Of one pixel, in the place of what its samples show.
 void showMap(const PatchSource& source, float i, float j, float cells, size_t k, MaterialRow& out, UvRow& finish) {
     const uint32_t code = source.block->map;
+    if (source.hasLight) showLight(source, i, j, cells, k, out);
+    if ((code & kMapDensity) == 0) return;
     const MapLook look = mapLook(source.map, code, i, j, cells);
     out.red[k] = look.colour.x;
     out.green[k] = look.colour.y;

@@ -25,10 +25,16 @@
     }
 }
 
-/// From the directions of patches to those of the camera; a surface that sends no light of its own. `finish`: metallic
-/// and roughness. What has no material is lit by the formula of points, as those that no patch fits are beside it.
+/// Surfaces that are lit and send no light of their own.
+[[gnu::always_inline]] inline void clearLight(const WinningPixels& p, bool hasEmission, MaterialRow& __restrict s) {
+    for (size_t i = 0; i < p.count; ++i) s.flags[i] = 0;
+    for (size_t i = 0; hasEmission && i < p.count; ++i) s.emissionR[i] = s.emissionG[i] = s.emissionB[i] = 0;
+}
+
+/// From the directions of patches to those of the camera. `finish`: metallic and roughness. What has no material is lit
+/// by the formula of points, as those that no patch fits are beside it.
 [[gnu::always_inline]] inline void turnPatches(const PatchSource* blocks, const WinningPixels& p, const UvRow& finish,
-                                               bool hasEmission, MaterialRow& __restrict s) {
+                                               MaterialRow& __restrict s) {
     for (size_t i = 0; i < p.count; ++i) {
         const PatchSource& source = blocks[p.id[i] / kBlockLanes];
         const DrawMesh& m = *source.mesh;
@@ -39,8 +45,7 @@
         s.metallic[i] = finish.u[i];
         s.roughness[i] = finish.v[i];
         s.occlusion[i] = 1;
-        s.flags[i] = source.materialOf(0) == kPlainPoint ? 0u : kPixelTriangle;
-        if (hasEmission) s.emissionR[i] = s.emissionG[i] = s.emissionB[i] = 0;
+        s.flags[i] = source.materialOf(0) == kPlainPoint ? 0u : kPixelTriangle | s.flags[i];
     }
 }
 
@@ -95,6 +100,7 @@ void resolvePatches(const FrameConstants& f, const ResolveInput& in, const Winni
                     TexelRow& __restrict row, const SurfacePlanes& planes) {
     TriangleRow t;
     const RowRays rays = rowRays(f, x0, y);
+    clearLight(p, planes.emissive != nullptr, t.material);
     if (f.patchAs == kPatchDirect) {
         mixDirect(f, in, p, rays, t.material, t.uv);
     } else {
@@ -104,7 +110,7 @@ void resolvePatches(const FrameConstants& f, const ResolveInput& in, const Winni
         mixColours(p, t.corners, t.wb, t.wc, t.material);
         showMaps(in.patchBlocks, p, rays, t.corners, t.wb, t.wc, t.material, t.uv);
     }
-    turnPatches(in.patchBlocks, p, t.uv, planes.emissive != nullptr, t.material);
+    turnPatches(in.patchBlocks, p, t.uv, t.material);
     packSurfaces(p, rays, t.material, t.perpX, t.perpY, t.word);
     debugColours(f, in.patchBlocks, p, t.material);
     storeTriangles(p, t, row, planes);

@@ -8,22 +8,26 @@ namespace stipple::reference {
 
 class MapReader {
   public:
-    /// `words`: of its chunk; `map`: what the block says: 2 bits log2 of texels along a cell, 1 bit has normals, 1 bit
-    /// has materials, 28 bits first word.
+    /// `words`: of its chunk; `map`: what the block says: 2 bits log2 of texels along a cell (0: no colours), 1 bit has
+    /// normals, 1 bit has materials, 1 bit has light, 27 bits first word.
     MapReader(const std::vector<uint32_t>& words, uint32_t map) : words_(words), map_(map) {
         const uint32_t k = 1u << map % 4;
-        size_t at = map / 16;
+        size_t at = map / 32;
         for (uint32_t edge = k; edge > 0; edge /= 2) addLevel(16 * edge, 8 * edge, at);
         for (uint32_t cells = 2; cells <= 8; cells *= 2) addLevel(16 / cells, 8 / cells, at);
-        texels_ = at - map / 16;
+        texels_ = at - map / 32;
     }
     bool isThere() const { return map_ != 0; }
+    bool hasColours() const { return map_ % 4 != 0; }
     bool hasNormals() const { return map_ / 4 % 2 != 0; }
     bool hasMaterials() const { return map_ / 8 % 2 != 0; }
+    bool hasLight() const { return map_ / 16 % 2 != 0; }
 
     struct Look {
         glm::dvec3 colour{0}, normal{0};  ///< linear; of (U, V, N), any length
         glm::dvec2 finish{0};             ///< metallic and roughness
+        glm::dvec3 emission{0};           ///< linear
+        double unlit = 0;                 ///< share of the place
     };
     /// `at`: samples from the block's first one; `cells`: that a pixel covers there.
     Look look(const glm::dvec2& at, double cells) const {
@@ -55,6 +59,9 @@ class MapReader {
             const double w = share * near.x * near.y;
             const size_t texel = of.first + static_cast<size_t>(low.y + corner.y) * (of.across + 1) +
                                  static_cast<size_t>(low.x + corner.x);
+            if (hasLight())
+                addLight(words_[texel + texels_ * ((hasColours() ? 1 : 0) + (hasNormals() ? 1 : 0))], w, out);
+            if (!hasColours()) continue;
             const uint32_t word = words_[texel];
             out.colour +=
                 w * glm::dvec3(decodeSrgb(word % 256), decodeSrgb(word / 256 % 256), decodeSrgb(word / 65536 % 256));
@@ -62,6 +69,16 @@ class MapReader {
             out.finish += w * glm::dvec2(number / 16 / 15.0, 1 - number % 16 / 15.0);
             if (hasNormals()) out.normal += w * decodeDirection(words_[texel + texels_]);
         }
+    }
+    /// The highest bit: not lit; else four of a power of two, and a byte a colour.
+    static void addLight(uint32_t word, double w, Look& out) {
+        if (word >= 1u << 31) {
+            out.unlit += w;
+            return;
+        }
+        const double times = w * static_cast<double>(1u << (word >> 24) % 16);
+        out.emission +=
+            times * glm::dvec3(decodeSrgb(word % 256), decodeSrgb(word / 256 % 256), decodeSrgb(word / 65536 % 256));
     }
 
     const std::vector<uint32_t>& words_;

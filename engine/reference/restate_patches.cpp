@@ -33,6 +33,11 @@ class PatchProjector {
             const MapReader map(chunk.patchMaps, chunk.patchBlocks[b].map);
             const ShowPlace show = [&](const glm::dvec2& at, double cells, Sample& s, dvec3& n) {
                 const MapReader::Look look = map.look(at, cells);
+                if (!draws_.onlyMaterial && hasMaterial(chunk)) {
+                    s.emissive = look.emission;
+                    s.isUnlit = look.unlit >= 0.5;
+                }
+                if (!map.hasColours()) return;
                 s.colour = look.colour;
                 if (map.hasNormals()) n = normalOf(block.inStore(look.normal));
                 if (!map.hasMaterials() || draws_.onlyMaterial || chunk.materials.empty()) return;

@@ -90,7 +90,7 @@ void addPatches(const lod::Chunk& chunk, uint32_t node, TracedStore& t) {
     t.mapWords.insert(t.mapWords.end(), chunk.patchMaps.begin(), chunk.patchMaps.end());
     for (size_t b = 0; b < chunk.patchBlocks.size(); ++b) {
         const uint32_t map = chunk.patchBlocks[b].map;
-        t.maps.push_back(map == 0 ? 0 : map + 16 * firstWord);
+        t.maps.push_back(map == 0 ? 0 : map + 32 * firstWord);
         const PatchBlockReader block(h, h.nodes[node], chunk.patchBlocks[b], chunk.patchPlanes[b]);
         t.frames.emplace_back(block.inStore({1, 0, 0}), block.inStore({0, 1, 0}), block.inStore({0, 0, 1}));
         const auto base = static_cast<uint32_t>(t.vertices.size());
@@ -395,6 +395,11 @@ class Tracer {
     void showMap(const TracedStore& store, const lod::Instance& place, const std::array<uint32_t, 3>& corners,
                  const MapReader& map, const dvec2& at, double cells, Sample& s, dvec3& n) const {
         const MapReader::Look look = map.look(at, cells);
+        if (!settings_.draw.pointMaterial && !store.store->description.pointMaterials.empty()) {
+            s.emissive = look.emission;
+            s.isUnlit = look.unlit >= 0.5;
+        }
+        if (!map.hasColours()) return;
         s.colour = look.colour;
         if (map.hasNormals()) n = toCamera(place.rotation * (store.frames[corners[0] / 153] * look.normal));
         const bool isList = store.store->description.pointMaterials.size() > 1;

@@ -32,6 +32,7 @@ struct Look {
     Layer colour, light, normal, finish;
     float normalScale = 1, roughness = 1, metallic = 0;
     uint8_t number = 0;
+    bool isUnlit = false;
 };
 
 Layer layerOf(const Scene& scene, const std::vector<DecodedImage>& images, const Material& m, const TextureUse& use) {
@@ -94,7 +95,7 @@ lod::PlaceLooks placeLooks(const Scene& scene, const std::vector<DecodedImage>& 
         looks.push_back({glm::vec3(m.baseColour), m.emissive, layerOf(scene, images, m, m.baseColourTexture),
                          layerOf(scene, images, m, m.emissiveTexture), layerOf(scene, images, m, m.normalTexture),
                          layerOf(scene, images, m, m.metallicRoughnessTexture), m.normalScale, m.roughness, m.metallic,
-                         materials.numbers[looks.size()]});
+                         materials.numbers[looks.size()], m.isUnlit});
     return
         [looks = std::move(looks), none = materials.numbers.back()](uint32_t surface, const glm::vec2& uv, float side) {
             lod::PlaceLook out;
@@ -108,7 +109,9 @@ lod::PlaceLooks placeLooks(const Scene& scene, const std::vector<DecodedImage>& 
                 out.material = lod::gridIndex(double{look.roughness * finish.g}, double{look.metallic * finish.b});
             }
             out.colour = look.base * glm::vec3(look.colour.at(uv, side, true));
-            if (look.emissive != glm::vec3(0)) out.colour += look.emissive * glm::vec3(look.light.at(uv, side, true));
+            out.isUnlit = look.isUnlit;
+            if (look.emissive != glm::vec3(0) && !look.isUnlit)
+                out.emission = look.emissive * glm::vec3(look.light.at(uv, side, true));
             if (!look.normal.image || look.normal.image->rgba.empty()) return out;
             const glm::vec3 n = 2.0f * glm::vec3(look.normal.at(uv, side, false)) - 1.0f;
             out.normal = {n.x * look.normalScale, n.y * look.normalScale, n.z};
@@ -118,6 +121,7 @@ lod::PlaceLooks placeLooks(const Scene& scene, const std::vector<DecodedImage>& 
 
 lod::TextureDetail textureDetail(const Scene& scene, const std::vector<DecodedImage>& images) {
     lod::TextureDetail out;
+    out.hasLight = hasLight(scene);
     const std::vector<bool> isUsed = usedMaterials(scene, placements(scene));
     std::vector<float> texels;
     for (size_t k = 0; k < scene.materials.size(); ++k) {
@@ -131,12 +135,26 @@ lod::TextureDetail textureDetail(const Scene& scene, const std::vector<DecodedIm
         out.hasNormals = out.hasNormals || layerOf(scene, images, m, m.normalTexture).isThere();
         out.hasMaterials = out.hasMaterials || layerOf(scene, images, m, m.metallicRoughnessTexture).isThere();
     }
-    if (std::none_of(texels.begin(), texels.end(), [](float t) { return t > 0; })) return {};
+    if (std::none_of(texels.begin(), texels.end(), [](float t) { return t > 0; })) return out;
     out.texels = [texels](uint32_t surface) {
         const size_t m = surface & shared::kSurfaceMaterialMask;
         return m < texels.size() ? texels[m] : 0.0f;
     };
     return out;
+}
+
+bool hasLight(const Scene& scene) {
+    const std::vector<bool> isUsed = usedMaterials(scene, placements(scene));
+    for (size_t k = 0; k < scene.materials.size(); ++k)
+        if (isUsed[k] && (scene.materials[k].isUnlit || scene.materials[k].emissive != glm::vec3(0))) return true;
+    return false;
+}
+
+bool isAllUnlit(const Scene& scene) {
+    const std::vector<bool> isUsed = usedMaterials(scene, placements(scene));
+    for (size_t k = 0; k < isUsed.size(); ++k)
+        if (isUsed[k] && (k == scene.materials.size() || !scene.materials[k].isUnlit)) return false;
+    return true;
 }
 
 bool hasTextures(const Scene& scene) {

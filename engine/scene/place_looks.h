@@ -17,12 +17,17 @@ struct MaterialList {
 };
 MaterialList materialList(const Scene& scene);
 
-/// Of meshes as triangleSource gives them, with numbers in the list of materials. Emission is added to the colour,
-/// alpha is left out. Both arguments must stay.
+/// Of meshes as triangleSource gives them, with numbers in the list of materials. Alpha is left out. Both arguments
+/// must stay.
 lod::PlaceLooks placeLooks(const Scene& scene, const std::vector<DecodedImage>& images);
 
 /// What the textures behind those looks hold, of the materials of visible triangles.
 lod::TextureDetail textureDetail(const Scene& scene, const std::vector<DecodedImage>& images);
+
+/// Some material of visible triangles sends light, or is not lit.
+bool hasLight(const Scene& scene);
+/// Are all of them not lit?
+bool isAllUnlit(const Scene& scene);
 
 /// Some material has a texture that a PlaceLook holds something of.
 bool hasTextures(const Scene& scene);

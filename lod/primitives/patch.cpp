@@ -19,10 +19,11 @@ namespace {
 std::string mapFault(const Patch& p) {
     const PatchMap& m = p.map;
     if (m.density > PatchMap::kMostDensity) return "has a map of too many texels a cell";
-    const size_t texels = m.density == 0 ? 0
-                                         : (size_t{p.width - 1} << m.density) * (size_t{p.height - 1} << m.density) +
-                                               ((size_t{p.width - 1} + (p.height - 1)) << m.density) + 1;
-    const bool isWhole = m.colours.size() == texels && (m.normals.empty() || m.normals.size() == texels);
+    const size_t all = (size_t{p.width - 1} << m.density) * (size_t{p.height - 1} << m.density) +
+                       ((size_t{p.width - 1} + (p.height - 1)) << m.density) + 1;
+    const size_t texels = m.density == 0 ? 0 : all;
+    const bool isWhole = m.colours.size() == texels && (m.normals.empty() || m.normals.size() == texels) &&
+                         (m.light.empty() || m.light.size() == all);
     return isWhole ? "" : "has a map of another size than its sides say";
 }
 

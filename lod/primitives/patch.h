@@ -19,14 +19,16 @@
 namespace stipple::lod {
 
 /// Attributes of a patch at a resolution of their own: texels on the corners of a lattice 2, 4 or 8 times as fine as
-/// that of its samples, row by row, (width - 1) k + 1 of them in the first. Those that no drawn cell touches say
-/// nothing.
+/// that of its samples (k), row by row, (width - 1) k + 1 of them in the first. Those that no drawn cell touches say
+/// nothing. What sends light, or is not lit, and has colours of its samples, has light alone, of k = 1.
 struct PatchMap {
     static constexpr uint32_t kMostDensity = 3;
-    uint32_t density = 0;           ///< log2 k; 0: there is no map
+    uint32_t density = 0;           ///< log2 k; 0: neither colours nor normals
     bool hasMaterials = false;      ///< numbers of materialGrid() stand above the colours
     std::vector<uint32_t> colours;  ///< sRGB 8 + 8 + 8
     std::vector<uint32_t> normals;  ///< octahedral 16 + 16 of (U, V, N); empty: those of the samples are mixed
+    std::vector<uint32_t> light;    ///< mapEmission (shaders/shared/patch_map.h); empty: lit, and sends none
+    bool isThere() const { return density > 0 || !light.empty(); }
     bool operator==(const PatchMap&) const = default;
 };
 

@@ -7,7 +7,7 @@
 #include "engine/base/check.h"
 #include "engine/base/numbers.h"
 #include "lod/primitives/octahedral.h"
-#include "shaders/shared/patch_map.h"
+#include "shaders/shared/record.h"
 
 namespace stipple::lod {
 namespace {
@@ -25,15 +25,19 @@ float linearOf(uint32_t byte) {
 
 /// What nine texels are together.
 struct TexelMean {
-    float weights = 0, rough = 0, metallic = 0;
-    glm::vec3 colour{0}, normal{0};
+    float weights = 0, rough = 0, metallic = 0, unlit = 0;
+    glm::vec3 colour{0}, normal{0}, emission{0};
 
     void add(float w, uint32_t texel) {
-        weights += w;
         colour += w * glm::vec3(linearOf(texel), linearOf(texel >> 8), linearOf(texel >> 16));
         rough += w * static_cast<float>(texel >> 24 & 15u);
         metallic += w * static_cast<float>(texel >> 28);
     }
+    void addLight(float w, uint32_t light) {
+        emission += w * emissionOf(light);
+        unlit += keepsColour(light) ? w : 0;
+    }
+    uint32_t light() const { return packLight(emission / weights, unlit >= 0.5f * weights); }
     uint32_t texel(bool hasMaterials) const {
         uint32_t out = 0;
         for (int a = 0; a < 3; ++a)
@@ -46,19 +50,48 @@ struct TexelMean {
 
 }  // namespace
 
+uint32_t packLight(const glm::vec3& emission, bool isUnlit) {
+    if (isUnlit) return shared::kMapUnlit;
+    constexpr int kMost = 15;
+    const float most = std::max({emission.x, emission.y, emission.z});
+    const int log2 = most > 1 ? std::min(std::isfinite(most) ? std::ilogb(most) + 1 : kMost, kMost) : 0;
+    uint32_t out = 0;
+    for (int a = 0; a < 3; ++a)
+        out |= uint32_t{unitToByte(shared::srgbFromLinear(std::clamp(std::ldexp(emission[a], -log2), 0.0f, 1.0f)))}
+               << (8 * a);
+    return out == 0 ? 0 : out | static_cast<uint32_t>(log2) << 24;
+}
+
+glm::vec3 emissionOf(uint32_t light) {
+    if (keepsColour(light)) return glm::vec3(0);
+    const auto times = static_cast<float>(1u << (light >> 24 & 15u));
+    return times * glm::vec3(linearOf(light), linearOf(light >> 8), linearOf(light >> 16));
+}
+
+uint32_t withEmission(uint32_t colour, uint32_t light) {
+    const glm::vec3 more = emissionOf(light);
+    if (more == glm::vec3(0)) return colour;
+    uint32_t out = colour & 0xff000000u;
+    for (int a = 0; a < 3; ++a)
+        out |= uint32_t{unitToByte(shared::srgbFromLinear(std::min(linearOf(colour >> (8 * a)) + more[a], 1.0f)))}
+               << (8 * a);
+    return out;
+}
+
 uint32_t mapCode(const Patch& p) {
-    if (p.map.density == 0) return 0;
+    const uint32_t light = p.map.light.empty() ? 0u : shared::kMapLight;
+    if (p.map.density == 0) return light;
     return p.map.density | (p.map.normals.empty() ? 0u : shared::kMapNormals) |
-           (p.map.hasMaterials ? shared::kMapMaterials : 0u);
+           (p.map.hasMaterials ? shared::kMapMaterials : 0u) | light;
 }
 
 uint8_t mapCodeOf(std::span<const Patch> patches) {
-    uint32_t density = 0, normals = 0;
+    uint32_t density = 0, planes = 0;
     for (const Patch& p : patches) {
         density = std::max(density, p.map.density);
-        normals |= mapCode(p) & shared::kMapNormals;
+        planes |= mapCode(p) & (shared::kMapNormals | shared::kMapLight);
     }
-    return static_cast<uint8_t>(density | normals);
+    return static_cast<uint8_t>(density | planes);
 }
 
 MapLevel mapOf(const Patch& p) {
@@ -75,6 +108,7 @@ MapLevel mapOf(const Patch& p) {
         }
     out.colours = p.map.colours;
     out.normals = p.map.normals;
+    out.light = p.map.light;
     return out;
 }
 
@@ -84,8 +118,9 @@ MapLevel coarser(const MapLevel& fine, bool hasMaterials) {
     out.height = fine.height / 2 + 1;
     const size_t texels = size_t{out.width} * out.height;
     out.isKnown.assign(texels, 0);
-    out.colours.assign(texels, 0);
+    if (!fine.colours.empty()) out.colours.assign(texels, 0);
     if (!fine.normals.empty()) out.normals.assign(texels, 0);
+    if (!fine.light.empty()) out.light.assign(texels, 0);
     for (uint32_t j = 0; j < out.height; ++j)
         for (uint32_t i = 0; i < out.width; ++i) {
             TexelMean mean;
@@ -96,13 +131,16 @@ MapLevel coarser(const MapLevel& fine, bool hasMaterials) {
                     const size_t from = fine.at(static_cast<uint32_t>(x), static_cast<uint32_t>(y));
                     if (fine.isKnown[from] == 0) continue;
                     const float w = (u == 0 ? 0.5f : 0.25f) * (v == 0 ? 0.5f : 0.25f);
-                    mean.add(w, fine.colours[from]);
+                    mean.weights += w;
+                    if (!fine.colours.empty()) mean.add(w, fine.colours[from]);
+                    if (!fine.light.empty()) mean.addLight(w, fine.light[from]);
                     if (!fine.normals.empty()) mean.normal += w * glm::vec3(shared::octDecode(fine.normals[from]));
                 }
             if (!(mean.weights > 0)) continue;
             const size_t to = out.at(i, j);
             out.isKnown[to] = 1;
-            out.colours[to] = mean.texel(hasMaterials);
+            if (!fine.colours.empty()) out.colours[to] = mean.texel(hasMaterials);
+            if (!fine.light.empty()) out.light[to] = mean.light();
             if (!fine.normals.empty())
                 out.normals[to] = octEncode(glm::length(mean.normal) > 1e-3f ? mean.normal : glm::vec3(0, 0, 1));
         }
@@ -113,6 +151,7 @@ void sampleColours(Patch& p) {
     if (p.map.density == 0) return;
     MapLevel level = mapOf(p);
     level.normals.clear();
+    level.light.clear();
     for (uint32_t l = 0; l < p.map.density; ++l) level = coarser(level, false);
     // (A level may be a texel wider than the samples are.)
     for (uint32_t j = 0; j < p.height; ++j)
@@ -122,16 +161,15 @@ void sampleColours(Patch& p) {
         }
 }
 
-PatchMips::PatchMips(const Patch& patch) : density_(patch.map.density) {
-    if (density_ == 0) return;
-    flags_ = mapCode(patch);
+PatchMips::PatchMips(const Patch& patch) : density_(patch.map.density), flags_(mapCode(patch)) {
+    if (flags_ == 0) return;
     levels_.push_back(mapOf(patch));
     while (levels_.size() < shared::mapLevels(density_))
         levels_.push_back(coarser(levels_.back(), patch.map.hasMaterials));
 }
 
 uint32_t PatchMips::appendTo(std::vector<uint32_t>& texels, uint32_t i, uint32_t j) const {
-    if (density_ == 0) return 0;
+    if (flags_ == 0) return 0;
     const size_t first = texels.size();
     STIPPLE_CHECK(first + shared::mapWords(flags_) < kMostWords, "the maps of a chunk are too large");
     texels.resize(first + shared::mapWords(flags_), 0);
@@ -146,7 +184,8 @@ uint32_t PatchMips::appendTo(std::vector<uint32_t>& texels, uint32_t i, uint32_t
                 std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(level.at(x0, y0 + y)), width,
                             texels.begin() + static_cast<std::ptrdiff_t>(plane + size_t{y} * across));
         };
-        copy(level.colours, to);
+        if (!level.colours.empty()) copy(level.colours, to);
+        if (!level.light.empty()) copy(level.light, to + shared::mapLightFirst(flags_));
         if (!level.normals.empty()) copy(level.normals, to + shared::mapTexels(density_));
     }
     return flags_ | static_cast<uint32_t>(first) << shared::kMapFirstShift;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "lod/primitives/patch.h"
+#include "shaders/shared/patch_map.h"
 
 namespace stipple::lod {
 
@@ -16,6 +17,15 @@ uint32_t mapCode(const Patch& patch);
 /// The same of all patches of a payload, Payload::maps: the largest of each, without materials.
 uint8_t mapCodeOf(std::span<const Patch> patches);
 
+/// A word of PatchMap::light: the emission (linear; 2^15 at most), or that a place is shown as it is, and not lit.
+uint32_t packLight(const glm::vec3& emission, bool isUnlit);
+/// Is that what it says?
+inline bool keepsColour(uint32_t light) { return (light & shared::kMapUnlit) != 0; }
+/// Linear; of what is not lit 0.
+glm::vec3 emissionOf(uint32_t light);
+/// A colour (sRGB) and what a place beside it sends, as one colour: of records that send nothing by themselves.
+uint32_t withEmission(uint32_t colour, uint32_t light);
+
 /// Normals of maps stand on steps of so many of their 65535 codes: 0.5 degrees off at most.
 constexpr int kMapNormalStep = 128;
 
@@ -23,11 +33,11 @@ constexpr int kMapNormalStep = 128;
 struct MapLevel {
     uint32_t width = 0, height = 0;
     std::vector<uint8_t> isKnown;
-    std::vector<uint32_t> colours, normals;  ///< as PatchMap has them
+    std::vector<uint32_t> colours, normals, light;  ///< as PatchMap has them
     size_t at(uint32_t i, uint32_t j) const { return size_t{j} * width + i; }
 };
 
-/// The map itself; `isKnown`: some drawn cell touches the texel. Only of patches that have one.
+/// The map itself; `isKnown`: some drawn cell touches the texel. Of a patch without one, a texel a sample.
 MapLevel mapOf(const Patch& patch);
 /// The level above.
 MapLevel coarser(const MapLevel& fine, bool hasMaterials);

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "lod/primitives/octahedral.h"
+#include "lod/primitives/patch_map.h"
 
 namespace stipple::lod {
 namespace {
@@ -58,12 +59,20 @@ class Samples {
         return shared::PointRecord{static_cast<uint32_t>(q.x) | static_cast<uint32_t>(q.y) << 16,
                                    static_cast<uint32_t>(q.z) | radiusCodeOf(radius / (65536 * step_)) << 16,
                                    octEncode(glm::vec3(frame * normal)),
-                                   (block.colours[s] & 0xffffffu) | shared::kFlagTwoSided << 24};
+                                   (colourOf(block, s) & 0xffffffu) | shared::kFlagTwoSided << 24};
     }
 
   private:
     static uint32_t codeOf(const shared::PatchBlock& b, uint32_t s) {
         return b.heights[s / 2] >> (16 * (s % 2)) & 0xffffu;
+    }
+    /// With what it sends by itself: the map has a level with a texel a sample.
+    uint32_t colourOf(const shared::PatchBlock& b, uint32_t s) const {
+        if ((b.map & shared::kMapLight) == 0) return b.colours[s];
+        const uint32_t level = b.map & shared::kMapDensity;
+        return withEmission(b.colours[s],
+                            of_.patchMaps[(b.map >> shared::kMapFirstShift) + s + shared::mapLightFirst(b.map) +
+                                          shared::mapLevelFirst(level, level)]);
     }
     /// That lies so many blocks to the right and up; nullptr: there is none.
     const shared::PatchBlock* besides(const shared::PatchBlock& b, int right, int up) const {

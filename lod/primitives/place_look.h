@@ -11,6 +11,8 @@ struct PlaceLook {
     glm::vec3 colour{1};        ///< linear; times that of the vertices
     glm::vec3 normal{0, 0, 1};  ///< in the triangle's tangents: x along u, y against v
     uint8_t material = 0;       ///< number in a list that comes with the function
+    glm::vec3 emission{0};      ///< linear, any brightness
+    bool isUnlit = false;       ///< shown as it is, whatever the light
 };
 
 /// What the textures behind looks hold.
@@ -18,6 +20,7 @@ struct TextureDetail {
     /// Texels of a surface's finest texture along a unit of texture coordinates (the mean of both); 0: it has none.
     std::function<float(uint32_t surface)> texels;
     bool hasNormals = false, hasMaterials = false;  ///< textures say something of normals; of roughness or metallic
+    bool hasLight = false;  ///< some material sends light, or is not lit, with textures or without: patches keep that
 };
 
 /// Maps of patches that are made of a mesh.

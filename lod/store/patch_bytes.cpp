@@ -41,7 +41,7 @@ struct Sizes {
     NormalFrom normalFrom;
     uint8_t hasMaterials;            ///< 1: SizesOfMaterials follow
     uint8_t finerNormals;            ///< log2 of kUsualStep / their step
-    uint8_t hasMaps;                 ///< 1: SizeOfMaps follows
+    uint8_t hasMaps;                 ///< 1: SizeOfMaps follows; 2: and some have light of their own
     std::array<uint32_t, 5> packed;  ///< heads, cells, heights, normals, colours
     std::array<uint32_t, 5> plain;
 };
@@ -211,7 +211,7 @@ PatchBytes encodePatches(std::span<const Patch> patches) {
     const Bytes plainMaterials = materialBytes(patches), materials = compress(plainMaterials);
     sizes.hasMaterials = plainMaterials.empty() ? 0 : 1;
     const PatchMapBytes maps = encodeMaps(patches);
-    sizes.hasMaps = maps.bytes.empty() ? 0 : 1;
+    sizes.hasMaps = maps.bytes.empty() ? 0 : maps.light == 0 ? 1 : 2;
     const auto add = [](Bytes& to, const auto& value) {
         to.resize(to.size() + sizeof(value));
         std::memcpy(to.data() + to.size() - sizeof(value), &value, sizeof(value));
@@ -231,6 +231,7 @@ PatchBytes encodePatches(std::span<const Patch> patches) {
     out.mapColours = maps.colours + (sizes.hasMaps != 0 ? sizeof(SizeOfMaps) : 0);
     out.mapNormals = maps.normals;
     out.mapMaterials = maps.materials;
+    out.mapLight = maps.light;
     out.geometry = sizeof(sizes) + packed[0].size() + packed[1].size() + packed[2].size();
     out.normals = packed[3].size();
     out.colours = packed[4].size();
@@ -347,7 +348,7 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
     }
     SizeOfMaps maps{};
     if (sizes.hasMaps != 0) {
-        if (sizes.hasMaps != 1 || bytes.size() < at + sizeof(maps)) return damaged();
+        if (sizes.hasMaps > 2 || bytes.size() < at + sizeof(maps)) return damaged();
         std::memcpy(&maps, bytes.data() + at, sizeof(maps));
         at += sizeof(maps);
     }
@@ -397,7 +398,8 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
         if (blocks > told.blocks || allCells > kMostCells + kCellsABlock * blocks) return damaged();
         plain.samples += markSamples(p);
     }
-    if (sizes.hasMaps != 0 && !decodeMaps(bytes.subspan(at), out, {blocks, told.map})) return damaged();
+    if (sizes.hasMaps != 0 && !decodeMaps(bytes.subspan(at), out, {blocks, told.map, sizes.hasMaps == 2}))
+        return damaged();
     for (const Patch& p : out) plain.coloured += p.map.density == 0 ? p.samples() : 0;
     if (cell != plain.cells.size() || plain.heights.size() != 2 * plain.samples ||
         plain.normals.size() != 4 * plain.samples || plain.colours.size() != 3 * plain.coloured ||

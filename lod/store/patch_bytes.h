@@ -26,14 +26,14 @@ struct PatchBytes {
     std::vector<uint8_t> bytes;
     /// Of `bytes`: heads, cells and heights; normals; colours; materials.
     uint64_t geometry = 0, normals = 0, colours = 0, materials = 0;
-    uint64_t mapColours = 0, mapNormals = 0, mapMaterials = 0;  ///< likewise, of maps
+    uint64_t mapColours = 0, mapNormals = 0, mapMaterials = 0, mapLight = 0;  ///< likewise, of maps
 };
 
 PatchBytes encodePatches(std::span<const Patch> patches);
 /// What the table of a store tells of a payload.
 struct PatchLimits {
     uint64_t blocks = ~uint64_t{0} >> 16;  ///< of 16 x 8 cells, no more
-    uint32_t map = 7;                      ///< as Payload::maps has it: no finer maps, no normals unless they are told
+    uint32_t map = 23;  ///< as Payload::maps has it: no finer maps, no normals or light unless they are told
 };
 /// Of any bytes. `where` for errors. No array is made before the bytes are there that can fill it, nor what is more
 /// than the table tells: what is taken is a small multiple of what such blocks take when they are decoded.

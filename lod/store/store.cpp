@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <type_traits>
@@ -17,6 +18,7 @@
 #include "lod/store/pages.h"
 #include "lod/store/tables.h"
 #include "lod/store/zstd_memory.h"
+#include "shaders/shared/patch_map.h"
 
 namespace stipple::lod {
 namespace {
@@ -71,6 +73,14 @@ Result<Stream> StoreWriter::appendStream(StreamId id, const std::vector<uint8_t>
     return stream;
 }
 
+namespace {
+/// Of their own, in maps of patches.
+bool hasLight(const Hierarchy& h) {
+    const auto has = [](const Payload& p) { return p.kind == Kind::patches && (p.maps & shared::kMapLight) != 0; };
+    return std::any_of(h.nodes.begin(), h.nodes.end(), has) || std::any_of(h.further.begin(), h.further.end(), has);
+}
+}  // namespace
+
 Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& description, uint32_t log2PageNodes) {
     STIPPLE_TRY(checkSpace(h, description));
     const std::string text = describeAsText(description);
@@ -85,7 +95,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
     STIPPLE_ASSIGN(head.description, write(text));
     STIPPLE_ASSIGN(head.mesh, write(meshBytes(h)));
     head.magic = kMagic;
-    head.version = kStoreVersion;
+    head.version = hasLight(h) ? kLightVersion : kStoreVersion;
     moveHead(h, head, kToDisk);
     head.nodeCount = h.nodes.size();
     head.fileBytes = file_.position() + sizeof(Foot);
@@ -107,7 +117,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
 
 namespace {
 
-bool hasPages(const Head& head) { return head.version == kStoreVersion; }
+bool hasPages(const Head& head) { return head.version == kStoreVersion || head.version == kLightVersion; }
 bool hasPayloadsInNodes(const Head& head) { return head.version == kOldVersion || head.version == kOldWideMeshVersion; }
 
 /// The head, with its hash and the foot's checked; of old versions what they do not have is empty.
@@ -124,7 +134,7 @@ Result<Head> readHead(const ByteSource& file) {
     const bool isOld = hasPayloadsInNodes(head);
     if (!hasPages(head) && head.version != kUnpagedVersion && head.version != kVersionBefore && !isOld)
         return fail(ErrorKind::input,
-                    fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion),
+                    fmt::format("has store version {}; this program reads version {}", head.version, kLightVersion),
                     path, "build it again with this program");
     const auto damaged = [&](const std::string& what) { return tl::unexpected(damagedStore(path, what)); };
     if (isOld) {  // the hash stands where others have more

@@ -18,6 +18,8 @@ namespace stipple::lod {
 
 /// Of the file format; a store of another version must be built again.
 inline constexpr uint32_t kStoreVersion = 10;
+/// The same with light of their own in maps of patches, which programs before that do not know.
+inline constexpr uint32_t kLightVersion = 11;
 /// Still read: with one payload a node; such meshes whose coordinates have more than 30 bits; without spacings of
 /// records (or with them, and taken for damaged by programs of then); without pages of nodes.
 inline constexpr uint32_t kOldVersion = 6, kOldWideMeshVersion = 7, kVersionBefore = 8, kUnpagedVersion = 9;

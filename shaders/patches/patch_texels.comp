@@ -10,6 +10,7 @@ struct PatchSurface {
     vec3 face;    // camera space
     vec3 colour;
     vec2 finish;  // metallic, roughness
+    MapLight light;
 };
 
 // What has no material is lit by the formula of points, as those that no patch fits are beside it.
@@ -24,6 +25,8 @@ vec3 colourOf(PatchBlocks of, uint block, uint s) { return decodeTexel(of.blocks
 // In the place of what samples show, where the block has a map.
 void showMap(PatchBlocks of, DrawNode node, uint block, float i, float j, float cells, inout PatchSurface s) {
     const uint map = of.blocks[block].map;
+    if ((map & kMapLight) != 0u && (node.material & kOnlyMaterial) == 0u) s.light = mapLight(node, map, i, j, cells);
+    if ((map & kMapDensity) == 0u) return;
     const MapLook look = mapLook(node, map, i, j, cells);
     s.colour = look.colour;
     if ((map & kMapNormals) != 0u) s.normal = look.normal;
@@ -42,12 +45,16 @@ PatchSurface onTriangle(PatchBlocks of, DrawNode node, uint block, DrawMesh m, u
     const vec2 w = triangleWeights(rayDirection(ray), fromRay(ray, p0), fromRay(ray, p1), fromRay(ray, p2));
     const float first = 1.0 - w.x - w.y;
     PatchSurface s;
-    s.normal = first * octDecode(of.blocks[block].normals[a]) + w.x * octDecode(of.blocks[block].normals[b]) + w.y * octDecode(of.blocks[block].normals[c]);
+    s.normal = first * octDecode(of.blocks[block].normals[a]) + w.x * octDecode(of.blocks[block].normals[b]) +
+               w.y * octDecode(of.blocks[block].normals[c]);
     s.face = cross(p1 - p0, p2 - p0);
+    s.light = MapLight(vec3(0.0), 0.0);
     s.colour = first * colourOf(of, block, a) + w.x * colourOf(of, block, b) + w.y * colourOf(of, block, c);
-    s.finish = first * patchFinishOf(node, block, a) + w.x * patchFinishOf(node, block, b) + w.y * patchFinishOf(node, block, c);
+    s.finish = first * patchFinishOf(node, block, a) + w.x * patchFinishOf(node, block, b) +
+               w.y * patchFinishOf(node, block, c);
     if (of.blocks[block].map == 0u) return s;
-    const vec2 d1 = latticeOf(b) - latticeOf(a), d2 = latticeOf(c) - latticeOf(a), at = latticeOf(a) + w.x * d1 + w.y * d2;
+    const vec2 d1 = latticeOf(b) - latticeOf(a), d2 = latticeOf(c) - latticeOf(a),
+               at = latticeOf(a) + w.x * d1 + w.y * d2;
     showMap(of, node, block, at.x, at.y, uvFootprint(ray, 1.0 / frame.focal, p0, p1 - p0, p2 - p0, d1, d2), s);
     return s;
 }
@@ -62,6 +69,7 @@ PatchSurface belowDisc(PatchBlocks of, DrawNode node, uint block, DrawMesh m, ui
     s.colour = vec3(0.0);
     s.finish = vec2(0.0);
     s.face = disc.normal;
+    s.light = MapLight(vec3(0.0), 0.0);
     for (uint c = 0u; c < 4u; ++c) {
         const uint at = mixed.first + c % 2u + kPatchStride * (c / 2u);
         const float w = mixed.weight[c];  // all four are there: the cell is drawn
@@ -109,6 +117,8 @@ void main() {
     if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(node.level);
     if (frame.debugView == kDebugError) t.colour = debugErrorColour(node.errorPixels);
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
-    triangleWords[2u * place] = flagsOf(node) | 0x00ff0000u | byteOf(seen.finish.x) | byteOf(seen.finish.y) << 8;
-    triangleWords[2u * place + 1u] = 0u;
+    const uint surface = flagsOf(node);
+    const uint flags = surface != 0u && seen.light.unlit >= 0.5 ? surface | kPixelUnlit : surface;
+    triangleWords[2u * place] = flags | 0x00ff0000u | byteOf(seen.finish.x) | byteOf(seen.finish.y) << 8;
+    triangleWords[2u * place + 1u] = packColour(seen.light.emission.x, seen.light.emission.y, seen.light.emission.z);
 }

@@ -1,22 +1,24 @@
-// Maps of a block of a patch: colours, and normals and materials where it has them, at 2, 4 or 8 texels along each edge
-// of a cell, with mips (Ochotta, Hiller & Saupe 2006, 3.2 and 3.5).
+// Maps of a block of a patch: colours, and normals, materials and light of its own where it has them, at 2, 4 or 8
+// texels along each edge of a cell, with mips (Ochotta, Hiller & Saupe 2006, 3.2 and 3.5). Light may also be there
+// alone, a texel a sample.
 //
 // Texels lie on the corners of a lattice, as samples do: level l has (16 k >> l) + 1 across and (8 k >> l) + 1 up, the
 // first one on the block's first sample. So each texel at the border of a block is its neighbour's, too, and nothing
 // is seen where they meet. Levels stand one after another, row by row; the last one has a texel every eight cells.
-// Colours come first, then as many words of normals.
+// Colours come first (unless there is a texel a sample), then as many words of normals, then of light.
 #ifndef STIPPLE_SHARED_PATCH_MAP_H
 #define STIPPLE_SHARED_PATCH_MAP_H
 #include "patch.h"
 #include "texture.h"
 SHARED_BEGIN
 
-// PatchBlock::map: log2 of texels along an edge of a cell (0: the block has no map) | kMap... | first word, among the
-// words of its chunk's maps.
+// PatchBlock::map: log2 of texels along an edge of a cell (0: colours are those of the samples) | kMap... | first word,
+// among the words of its chunk's maps. 0: the block has no map.
 const uint kMapDensity = 3u;
 const uint kMapNormals = 4u;    // octahedral 16 + 16 of (U, V, N); else those of the samples are mixed
 const uint kMapMaterials = 8u;  // above colours: roughness 4 | metallic 4, as patchMapFinish has it; else the samples'
-const uint kMapFirstShift = 4u;
+const uint kMapLight = 16u;     // words of mapEmission
+const uint kMapFirstShift = 5u;
 const uint kMapLevelsMore = 4u;  // levels of a map of density 1 (samples alone), and one more for each doubling
 
 SHARED_FN uint mapLevels(uint density) { return density + kMapLevelsMore; }
@@ -34,8 +36,21 @@ SHARED_FN uint mapTexels(uint density) {
 }
 // Words of a map whose PatchBlock::map has these lower bits.
 SHARED_FN uint mapWords(uint map) {
-    const uint texels = mapTexels(map & kMapDensity);
-    return (map & kMapDensity) == 0u ? 0u : (map & kMapNormals) != 0u ? 2u * texels : texels;
+    const uint colours = (map & kMapDensity) == 0u ? 0u : 1u;
+    const uint normals = (map & kMapNormals) != 0u ? colours : 0u;
+    return (colours + normals + ((map & kMapLight) != 0u ? 1u : 0u)) * mapTexels(map & kMapDensity);
+}
+// The first word of light, from the map's own.
+SHARED_FN uint mapLightFirst(uint map) { return mapWords(map & (kMapDensity | kMapNormals)); }
+
+// Light that a texel sends by itself, linear. A word: sRGB 8 + 8 + 8 | log2 of what that is multiplied with 4 | 0 | is
+// it shown as it is, and not lit.
+const uint kMapUnlit = 0x80000000u;
+SHARED_FN vec3 mapEmission(uint word) {
+    const float times = (word & kMapUnlit) != 0u ? 0.0f : float(int(1u << (word >> 24 & 15u)));
+    return vec3(times * linearFromByte(float(int(word & 255u)) * (1.0f / 255.0f)),
+                times * linearFromByte(float(int(word >> 8 & 255u)) * (1.0f / 255.0f)),
+                times * linearFromByte(float(int(word >> 16 & 255u)) * (1.0f / 255.0f)));
 }
 
 // The four texels of a level around a place, samples from the block's first one: that below and left of it, how far it

@@ -122,6 +122,60 @@ TEST(PatchMapStores, EveryLevelKeepsDetailThatNoSampleHas) {
     EXPECT_TRUE(verified) << (verified ? "" : verified.error().line());
 }
 
+// What shines on the leaves shines on every level; stores without that have not a byte more, nor another version.
+TEST(PatchMapStores, EveryLevelKeepsWhatShines) {
+    const auto shining = [](bool isTextured, bool hasLight) {
+        PatchBuildSettings settings = withMaps(isTextured ? 0 : 1);
+        settings.description.pointMaterials = {{}};
+        settings.maps.detail.hasLight = hasLight;
+        settings.looks = [hasLight](uint32_t, const glm::vec2& uv, float) {
+            PlaceLook look{{0.2f, 0.2f, 0.2f}};
+            if (hasLight && uv.x < 1.5f) look.emission = {2, 0.5f, 0};
+            look.isUnlit = hasLight && uv.x > 2.5f;
+            return look;
+        };
+        return settings;
+    };
+    for (const bool isTextured : {true, false}) {
+        const Built built = build(sheetOf(0.3), shining(isTextured, true));
+        EXPECT_EQ(built.bytes.at(8), kLightVersion);
+        const uint32_t deepest = deepestOf(built.store);
+        ASSERT_GE(deepest, 1u);
+        const Hierarchy& h = built.store.hierarchy;
+        for (uint32_t level = 0; level <= deepest; ++level) {
+            size_t texels = 0, wrong = 0;
+            forEachPatch(built.store, level, [&](const Patch& p, const glm::dvec3& corner) {
+                const PatchSurface surface(p);
+                for (uint32_t j = 0; j < p.height; ++j)
+                    for (uint32_t i = 0; i < p.width; ++i) {
+                        if (p.heights[p.at(i, j)] == 0) continue;
+                        const glm::dvec3 at = h.origin + h.unit * (corner + surface.position(p.at(i, j)));
+                        if (std::min({std::abs(at.x - 1.5), std::abs(at.x - 2.5), at.x, at.y, 4 - at.x, 4 - at.y}) <
+                            0.3)
+                            continue;
+                        ++texels;
+                        const uint32_t k = 1u << p.map.density, width = (p.width - 1) * k + 1;
+                        const uint32_t light = p.map.light.empty() ? 0 : p.map.light[size_t{j * k} * width + i * k];
+                        const glm::vec3 expected = at.x < 1.5 ? glm::vec3(2, 0.5f, 0) : glm::vec3(0);
+                        const bool isRight =
+                            glm::length(emissionOf(light) - expected) < 0.05f && keepsColour(light) == (at.x > 2.5);
+                        wrong += isRight ? 0 : 1;
+                    }
+            });
+            EXPECT_GT(texels, 100u);
+            EXPECT_EQ(wrong, 0u) << "level " << level << " of " << deepest << ", " << isTextured;
+        }
+        const auto executor = makeTbbExecutor(2);
+        const auto verified = verifyStore(built.store, *executor, 0);
+        EXPECT_TRUE(verified) << (verified ? "" : verified.error().line());
+        const Built dark = build(sheetOf(0.3), shining(isTextured, false));
+        EXPECT_EQ(dark.bytes.at(8), kStoreVersion);
+        PatchBuildSettings told = shining(isTextured, false);
+        told.maps.detail.hasLight = true;  // some material nobody has
+        EXPECT_TRUE(build(sheetOf(0.3), told).bytes == dark.bytes);
+    }
+}
+
 TEST(PatchMapStores, AreTheSameForAnyOrderAndThreads) {
     const Built built = build(sheetOf(0.3), withMaps(0));
     ASSERT_FALSE(built.bytes.empty());

@@ -40,6 +40,62 @@ std::vector<lod::Patch> ofAllKinds() {
     return all;
 }
 
+/// The same, and some send light: beside colours, and alone.
+std::vector<lod::Patch> ofAllKindsAndLight() {
+    std::vector<lod::Patch> all = ofAllKinds();
+    for (const size_t k : {size_t{0}, size_t{2}, size_t{3}}) {
+        lod::Patch p = all[k];
+        const lod::MapLevel level = lod::mapOf(p);
+        Rng rng(k);
+        p.map.light.assign(level.isKnown.size(), 0);
+        for (size_t t = 0; t < level.isKnown.size(); ++t) {
+            const float light = 9 * static_cast<float>(rng.uniform());
+            if (level.isKnown[t] != 0 && rng.below(3) > 0)
+                p.map.light[t] = lod::packLight({light, 0.1f * light, 0.5f}, rng.below(4) == 0);
+        }
+        all.push_back(p);
+    }
+    return all;
+}
+
+TEST(PatchMaps, LightComesBackExactlyAndCostsNothingWhereThereIsNone) {
+    const std::vector<lod::Patch> all = ofAllKindsAndLight();
+    const lod::PatchBytes encoded = lod::encodePatches(all);
+    EXPECT_EQ(encoded.geometry + encoded.normals + encoded.colours + encoded.materials + encoded.mapColours +
+                  encoded.mapNormals + encoded.mapMaterials + encoded.mapLight,
+              encoded.bytes.size());
+    EXPECT_GT(encoded.mapLight, 1000u);
+    const auto decoded = lod::decodePatches(encoded.bytes, "here");
+    ASSERT_TRUE(decoded) << decoded.error().line();
+    ASSERT_EQ(decoded->size(), all.size());
+    for (size_t k = 0; k < all.size(); ++k) {
+        EXPECT_TRUE(all[k].map == (*decoded)[k].map) << k;
+        EXPECT_EQ(all[k].colours, (*decoded)[k].colours) << k;
+    }
+    EXPECT_FALSE(lod::decodePatches(encoded.bytes, "here", {.map = 7})) << "the table tells of none";
+    const lod::PatchBytes none = lod::encodePatches(ofAllKinds());
+    EXPECT_EQ(none.mapLight, 0u);
+    EXPECT_EQ(none.bytes.at(7), 1) << "as before there was light";
+    // Alone it is the only map of its patch.
+    const lod::PatchBlocks blocks = lod::blocksOf(all[4]);
+    ASSERT_FALSE(blocks.blocks.empty());
+    EXPECT_EQ(blocks.maps.size(), blocks.blocks.size() * shared::mapTexels(0));
+}
+
+TEST(PatchMaps, LightIsAsBrightAsItWas) {
+    for (const float light : {0.0f, 0.004f, 0.3f, 1.0f, 1.01f, 2.0f, 77.7f, 30000.0f}) {
+        const glm::vec3 back = lod::emissionOf(lod::packLight({light, 0.5f * light, 0}, false));
+        EXPECT_NEAR(back.x, light, 0.01f * light + 2e-4f);
+        EXPECT_NEAR(back.y, 0.5f * light, 0.01f * light + 2e-4f);
+        EXPECT_EQ(back.z, 0);
+    }
+    EXPECT_EQ(lod::packLight({0, 0, 0}, false), 0u);
+    EXPECT_TRUE(lod::keepsColour(lod::packLight({5, 5, 5}, true)));
+    EXPECT_EQ(lod::emissionOf(lod::packLight({5, 5, 5}, true)), glm::vec3(0));
+    for (const float odd : {HUGE_VALF, 1e30f, -1.0f})
+        EXPECT_LE(lod::emissionOf(lod::packLight({odd, 0, 0}, false)).x, 32768);
+}
+
 TEST(PatchMaps, ComeBackExactly) {
     const std::vector<lod::Patch> all = ofAllKinds();
     const lod::PatchBytes encoded = lod::encodePatches(all);
@@ -60,7 +116,7 @@ TEST(PatchMaps, ComeBackExactly) {
 }
 
 TEST(PatchMaps, AreRefusedWhereTheyAreDamaged) {
-    std::vector<lod::Patch> all = ofAllKinds();
+    std::vector<lod::Patch> all = ofAllKindsAndLight();
     for (lod::Patch& p : all) ASSERT_EQ(lod::patchFault(p), "");
     const std::vector<uint8_t> whole = lod::encodePatches(all).bytes;
     for (size_t length = 0; length < whole.size(); length += 1 + length / 97) {
@@ -82,6 +138,8 @@ TEST(PatchMaps, AreRefusedWhereTheyAreDamaged) {
     EXPECT_NE(lod::patchFault(all[1]), "");
     all[1].map.density = 4;
     EXPECT_NE(lod::patchFault(all[1]), "");
+    all[4].map.light.pop_back();
+    EXPECT_NE(lod::patchFault(all[4]), "");
 }
 
 /// As a store of one node has it, told to be of such maps.
@@ -95,12 +153,15 @@ Result<lod::Chunk> chunkOf(const lod::Patch& p, uint8_t told, lod::Hierarchy& h)
 }
 
 TEST(PatchMaps, LargerThanTheTableSaysAreRefused) {
-    const std::vector<lod::Patch> all = ofAllKinds();
+    const std::vector<lod::Patch> all = ofAllKindsAndLight();
     for (size_t k = 0; k < all.size(); ++k)
-        for (uint8_t told = 0; told < 8; ++told) {
+        for (uint8_t told = 0; told < 32; ++told) {
+            if ((told & shared::kMapMaterials) != 0) continue;  // which tables do not tell
             lod::Hierarchy h;
             const auto chunk = chunkOf(all[k], told, h);
-            const bool isEnough = told % 4 >= k && (k < 2 || told >= 4);
+            const uint32_t density = all[k].map.density;
+            const bool isEnough = told % 4u >= density && (density < 2 || (told & shared::kMapNormals) != 0) &&
+                                  (all[k].map.light.empty() || (told & shared::kMapLight) != 0);
             ASSERT_EQ(chunk.has_value(), isEnough) << k << " " << int{told};
             if (chunk) EXPECT_LE(chunk->sizeBytes(), lod::decodedBytes(h, 0)) << "more than is counted on";
             if (chunk && told == lod::mapCodeOf(std::span(&all[k], 1)))
@@ -184,7 +245,7 @@ TEST(PatchMaps, MipsAreMeansOfLight) {
 
 // The same by the formulas of the backends, which share none with the reader above.
 TEST(PatchMaps, LevelsLieWhereTheFormatSays) {
-    for (const uint32_t density : {1u, 2u, 3u}) {
+    for (const uint32_t density : {0u, 1u, 2u, 3u}) {
         uint32_t first = 0;
         for (uint32_t l = 0; l < shared::mapLevels(density); ++l) {
             EXPECT_EQ(shared::mapLevelFirst(density, l), first) << density << ", level " << l;
@@ -192,7 +253,11 @@ TEST(PatchMaps, LevelsLieWhereTheFormatSays) {
             first += static_cast<uint32_t>((16 * k + 1) * (8 * k + 1));
         }
         EXPECT_EQ(shared::mapTexels(density), first);
-        EXPECT_EQ(shared::mapWords(density | shared::kMapNormals), 2 * first);
+        const uint32_t colours = density > 0 ? first : 0;  // of none there are no normals either
+        EXPECT_EQ(shared::mapWords(density | shared::kMapNormals), 2 * colours);
+        EXPECT_EQ(shared::mapWords(density | shared::kMapLight), colours + first);
+        EXPECT_EQ(shared::mapLightFirst(density | shared::kMapLight), colours);
+        EXPECT_EQ(shared::mapLightFirst(density | shared::kMapNormals | shared::kMapLight), 2 * colours);
     }
     EXPECT_EQ(shared::mapWords(0), 0u);
 }

@@ -17,17 +17,21 @@ void findBlocks(Frame& frame) {
     };
     render::placePatches(*frame.draws, planesOf, frame.patches, first);
     frame.patchBlocks.resize(batch.blocks.size());
+    frame.hasLitPatches = false;
     for (size_t b = 0; b < batch.blocks.size(); ++b) {
         const auto [node, place] = batch.blocks[b];
         const lod::Chunk& chunk = frame.chunks.at(batch.keys[node]);
         const shared::PatchBlock& block = chunk.patchBlocks[place];
         const shared::DrawNode& of = batch.nodes[node];
-        const bool hasOwn = of.materials != 0 && (of.material & shared::kOnlyMaterial) == 0;
+        const bool isOnly = (of.material & shared::kOnlyMaterial) != 0, hasOwn = of.materials != 0 && !isOnly;
+        const bool hasLight = (block.map & shared::kMapLight) != 0 && !isOnly;
+        frame.hasLitPatches = frame.hasLitPatches || hasLight;
         frame.patchBlocks[b] = {
             &block,
             &frame.patches[first[node] + block.number],
             of.level,
             of.errorPixels,
+            hasLight,
             of.material & ~shared::kOnlyMaterial,
             hasOwn ? chunk.materials.data() + size_t{place} * shared::kPatchSamples : nullptr,
             block.map != 0 ? chunk.patchMaps.data() + (block.map >> shared::kMapFirstShift) : nullptr};

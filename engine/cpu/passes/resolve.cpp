@@ -8,7 +8,7 @@
 namespace stipple::cpu {
 namespace {
 
-/// Planes that only triangles and patches need, those with an emissive material, and those with wide discs.
+/// Planes that only triangles and patches need, those with what sends light, and those with wide discs.
 void preparePlanes(Frame& frame, size_t pixels) {
     const auto fit = [&](HugeBuffer<uint32_t>& plane, size_t& size, bool isNeeded) {
         if (isNeeded && size != pixels) {
@@ -21,7 +21,7 @@ void preparePlanes(Frame& frame, size_t pixels) {
         frame.smoothPixels = pixels;
     }
     frame.hasTriangles = frame.draws->hasSurfaces();
-    frame.hasEmissive = false;
+    frame.hasEmissive = !frame.draws->patches().isEmpty() && frame.hasLitPatches;
     for (const shared::SurfaceMaterial& m : frame.draws->materials)
         frame.hasEmissive = frame.hasEmissive ||
                             (!frame.draws->triangles().isEmpty() && m.emissive.x + m.emissive.y + m.emissive.z > 0);

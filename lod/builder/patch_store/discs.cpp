@@ -5,6 +5,8 @@
 #include <cmath>
 #include <span>
 
+#include "lod/primitives/patch_map.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -17,7 +19,8 @@ LeftDisc united(std::span<const LeftDisc> discs) {
         weight += area;
         place += area * d.place;
         normal += area * glm::dvec3(d.normal);
-        for (int a = 0; a < 3; ++a) colour[a] += area * static_cast<double>(d.colour >> (8 * a) & 255u);
+        const uint32_t seen = withEmission(d.colour, d.light);
+        for (int a = 0; a < 3; ++a) colour[a] += area * static_cast<double>(seen >> (8 * a) & 255u);
     }
     one.place = place / weight;
     const double length = glm::length(normal);

@@ -14,6 +14,7 @@ struct LeftDisc {
     float radius = 0;  ///< lattice units
     uint32_t colour = 0;
     uint8_t material = 0;
+    uint32_t light = 0;  ///< PatchMap::light; discs of stores have it in their colour
 };
 
 /// One disc about the mean of those in a cubic cell of that edge, or of larger ones where that leaves more than `most`;

@@ -15,11 +15,12 @@ namespace {
 uint32_t facingOf(const glm::vec3& n) {
     const glm::vec3 a = glm::abs(n);
     const uint32_t axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
-    return axis + (n[static_cast<int>(axis)] < 0 ? 3u : 0u);
+    return 2 * (axis + (n[static_cast<int>(axis)] < 0 ? 3u : 0u));
 }
 /// Cosine between the way that a cell faces and a normal.
 double cosineOf(uint32_t facing, const glm::vec3& n) {
-    return (facing >= 3 ? -1.0 : 1.0) * static_cast<double>(n[static_cast<int>(facing % 3)]);
+    const uint32_t way = facing / 2;
+    return (way >= 3 ? -1.0 : 1.0) * static_cast<double>(n[static_cast<int>(way % 3)]);
 }
 
 }  // namespace
@@ -66,6 +67,13 @@ void LevelLooks::add(const std::vector<Seen>& seen, double step) {
             c.colour[a] =
                 s.weight * double{shared::linearFromSrgb(static_cast<float>(s.look.colour >> (8 * a) & 255u) / 255.0f)};
         cells_.push_back(c);
+        if (s.look.light == 0) continue;
+        ++c.facing;
+        c.material = 0;
+        c.most = keepsColour(s.look.light) ? s.weight : 0;
+        c.normal = glm::dvec3(0);
+        c.colour = s.weight * glm::dvec3(emissionOf(s.look.light));
+        cells_.push_back(c);
     }
     settle();
 }
@@ -101,8 +109,8 @@ std::optional<SurfaceLook> LevelLooks::at(const glm::dvec3& place, const glm::ve
     // slivers, whose normals may be any, those that face any way.
     const glm::dvec3 q = place / step - 0.5, low = glm::floor(q);
     for (const auto& [reach, facesAny] : {std::pair{1.0, false}, {2.0, false}, {2.0, true}}) {
-        glm::dvec3 colour(0), sum(0);
-        double weights = 0;
+        glm::dvec3 colour(0), sum(0), emission(0);
+        double weights = 0, unlit = 0;
         std::array<double, 256> ofMaterial{};
         const auto first = static_cast<int64_t>(reach) - 1, last = static_cast<int64_t>(reach);
         for (int64_t k = -first; k <= last; ++k)
@@ -119,6 +127,12 @@ std::optional<SurfaceLook> LevelLooks::at(const glm::dvec3& place, const glm::ve
                     const double w =
                         near.x * near.y * near.z * (facesAny ? 1.0 : std::max(0.0, cosineOf(c->facing, normal)));
                     if (!(w > 0)) continue;
+                    if (c->isOfLight()) {
+                        const double own = w / (c == cells_.begin() ? *c : *(c - 1)).weight;  // of the surface's
+                        emission += own * c->colour;
+                        unlit += own * c->most;
+                        continue;
+                    }
                     // Each cell as much as the next: that one holds more samples says nothing of its colour.
                     weights += w;
                     colour += w / c->weight * c->colour;
@@ -132,6 +146,7 @@ std::optional<SurfaceLook> LevelLooks::at(const glm::dvec3& place, const glm::ve
         for (int a = 0; a < 3; ++a)
             out.colour |= unitToByte(shared::srgbFromLinear(static_cast<float>(std::min(colour[a] / weights, 1.0))))
                           << (8 * a);
+        out.light = packLight(glm::vec3(emission / weights), unlit >= 0.5 * weights);
         out.material =
             static_cast<uint8_t>(std::max_element(ofMaterial.begin(), ofMaterial.end()) - ofMaterial.begin());
         return out;
@@ -165,7 +180,8 @@ void addCell(const Patch& p, const MapLevel& map, uint32_t i, uint32_t j, const 
             const auto material = p.map.hasMaterials ? static_cast<uint8_t>(map.colours[t] >> 24) : ofSample;
             const glm::dvec3 onPlane((i + u) * double{p.step}, (j + v) * double{p.step}, p.quantum() * height);
             seen.push_back({origin + p.origin + frame * onPlane,
-                            {glm::vec3(glm::normalize(frame * normal)), map.colours[t] & 0xffffffu, material},
+                            {glm::vec3(glm::normalize(frame * normal)), map.colours[t] & 0xffffffu, material,
+                             map.light.empty() ? 0u : map.light[t]},
                             side * side});
         }
 }
@@ -185,8 +201,9 @@ void addSeen(const Patch& p, const glm::dvec3& origin, std::vector<LevelLooks::S
         if (p.heights[s] == 0) continue;
         const glm::vec3 normal(surface.frame() * glm::dvec3(shared::octDecode(p.normals[s])));
         const uint8_t material = p.materials.empty() ? uint8_t{0} : p.materials[s];
-        seen.push_back(
-            {origin + surface.position(s), {normal, p.colours[s], material}, double{p.step} * double{p.step}});
+        seen.push_back({origin + surface.position(s),
+                        {normal, p.colours[s], material, p.map.light.empty() ? 0u : p.map.light[s]},
+                        double{p.step} * double{p.step}});
     }
 }
 

@@ -3,7 +3,8 @@
 //
 //     leaves' samples --> cells of their level's step --halved--> cells of the next level's --> ...
 //
-// Cells also know which of six ways their surface faces, so that what lies back to back keeps its own.
+// Cells also know which of six ways their surface faces, so that what lies back to back keeps its own. What sends
+// light, or is not lit, has a second cell at once behind its own, which holds that.
 #pragma once
 
 #include <optional>
@@ -41,10 +42,11 @@ class LevelLooks {
   private:
     struct Cell {
         int64_t x = 0, y = 0, z = 0;
-        uint32_t facing = 0;              ///< axis, and 3 more where it looks back along it
+        uint32_t facing = 0;              ///< twice the axis, and 6 where it looks back along it; 1 more: of light
         uint32_t material = 0;            ///< of most of it
-        double weight = 0, most = 0;      ///< of all, and of that material
-        glm::dvec3 colour{0}, normal{0};  ///< linear; both times their weight
+        double weight = 0, most = 0;      ///< of all, and of that material; of light: of what is not lit
+        glm::dvec3 colour{0}, normal{0};  ///< linear; both times their weight; of light: the emission
+        bool isOfLight() const { return facing % 2 != 0; }
     };
     static_assert(std::is_trivially_copyable_v<Cell>);
     static bool isBefore(const Cell& a, const Cell& b);

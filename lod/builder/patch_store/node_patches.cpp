@@ -73,6 +73,7 @@ class NodePatcher {
         s_.mostDensity = static_cast<uint32_t>(std::countr_zero(settings.maps.most));
         s_.hasMapNormals = settings.maps.hasNormals;
         s_.hasMapMaterials = settings.maps.hasMaterials;
+        s_.hasLight = settings.maps.hasLight;
         double step = settings.step;
         SampledSegments sampled = settings.samplesATriangle > 0 ? sampledLeaf(segments, settings, step)
                                                                 : sampledAt(segments, step, kWanted * step);
@@ -212,7 +213,7 @@ class NodePatcher {
         const glm::dvec2 w = (weights[0] + weights[1] + weights[2]) / 3.0;
         const SurfaceLook look = s_.look(triangle, w.x, w.y);
         out.push_back({corner_ + s_.middle + middle, look.normal, static_cast<float>(radius * (1 + 1e-6)), look.colour,
-                       look.material});
+                       look.material, look.light});
     }
 
     glm::dvec3 corner_;

@@ -38,6 +38,7 @@ struct NodeMaps {
     uint32_t most = 8;    ///< but no more than that
     double sourceTexel = 0;  ///< side of those of the source, lattice units; 0: it has none
     bool hasNormals = false, hasMaterials = false;
+    bool hasLight = false;  ///< also without maps of anything else
     /// Of texels beside steps of that length, lattice units; 0: there are no maps.
     double side(double step) const {
         if (texels > 0) return texels == 1 ? 0 : step / texels;

@@ -6,6 +6,7 @@
 #include "lod/builder/points/aggregate.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/patch_blocks.h"
+#include "lod/primitives/patch_map.h"
 #include "lod/store/chunk.h"
 
 namespace stipple::lod {
@@ -68,7 +69,7 @@ DiscPayload encodeDiscs(std::vector<LeftDisc>& discs, const Frame& frame, const 
         d.radius = static_cast<float>(radiusOf(radius, edge) * (1 + 1e-6));
         const auto word = [&](int a) { return static_cast<uint32_t>(q[a]); };
         chunk.records.push_back({word(0) | word(1) << 16, word(2) | radius << 16 | code << 24, octEncode(d.normal),
-                                 (d.colour & 0xffffffu) | shared::kFlagTwoSided << 24});
+                                 (withEmission(d.colour, d.light) & 0xffffffu) | shared::kFlagTwoSided << 24});
     }
     out.bytes = encodeChunk(chunk);
     return out;

@@ -208,7 +208,9 @@ class PatchCell {
     }
     NodeMaps mapsOf(const SurfaceNode& n) const {
         NodeMaps maps;
-        if (!settings_.looks || !settings_.maps.any()) return maps;
+        if (!settings_.looks) return maps;
+        maps.hasLight = settings_.maps.detail.hasLight;
+        if (!settings_.maps.any()) return maps;
         maps.most = n.node.isLeaf() ? kMostOfLeaf : kMostInner;
         maps.texels = std::min(settings_.maps.texels, maps.most);
         maps.sourceTexel = n.texels > 0 ? std::sqrt(n.texturedArea / n.texels) : 0;
@@ -252,7 +254,8 @@ class PatchCell {
             if (!n.isLeaf()) continue;
             for (const Patch& p : made[k].patches) addSeen(p, cornerOf(frame_, n), seen);
             for (const LeftDisc& d : made[k].left)
-                seen.push_back({d.place, {d.normal, d.colour, d.material}, double{d.radius} * double{d.radius}});
+                seen.push_back(
+                    {d.place, {d.normal, d.colour, d.material, d.light}, double{d.radius} * double{d.radius}});
         }
         return seen;
     }

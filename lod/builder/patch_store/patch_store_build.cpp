@@ -57,7 +57,7 @@ class PatchBuild : public CellContent {
         return needs;
     }
     std::string settingsAsText() const override {
-        return fmt::format("patches|{}|{}|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.looksIdentity,
+        return fmt::format("patches with light|{}|{}|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.looksIdentity,
                            settings_.maps.any() ? settings_.maps.texels : 1, settings_.coneDegrees, settings_.samples,
                            settings_.leafTriangles, kPatchCells, describeAsText(settings_.description));
     }

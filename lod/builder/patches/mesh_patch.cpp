@@ -366,7 +366,8 @@ class Patcher {
         return {static_cast<uint32_t>(std::lround(shift.x)), static_cast<uint32_t>(std::lround(shift.y))};
     }
 
-    /// The patch's map, whose texels lie on what lies over them: the first triangle that a line meets, as of samples.
+    /// The patch's map, if it has one, whose texels lie on what lies over them: the first triangle that a line meets,
+    /// as of samples.
     void drawMap(Patch& patch, const std::function<bool()>& isStopped) const {
         double wanted = 0;
         if (s_.mapTexels > 0)
@@ -374,15 +375,17 @@ class Patcher {
         else if (s_.texelSide > 0)
             wanted = std::round(std::log2(grid_.step / s_.texelSide));
         patch.map.density = toWhole<uint32_t>(std::clamp(wanted, 0.0, static_cast<double>(s_.mostDensity)));
-        if (patch.map.density == 0) return;
+        if (patch.map.density == 0 && !s_.hasLight) return;
+        const bool hasColours = patch.map.density > 0, hasNormals = hasColours && s_.hasMapNormals;
         const auto [i0, j0] = firstOf(patch);
         const MapLevel level = mapOf(patch);
         const double k = 1u << patch.map.density;
         const std::vector<uint32_t> over = trianglesOver(patch, level, i0, j0);
         PatchMap& map = patch.map;
-        map.hasMaterials = s_.hasMapMaterials;
-        map.colours.assign(level.isKnown.size(), 0);
-        if (s_.hasMapNormals) map.normals.assign(level.isKnown.size(), 0);
+        map.hasMaterials = hasColours && s_.hasMapMaterials;
+        if (hasColours) map.colours.assign(level.isKnown.size(), 0);
+        if (hasNormals) map.normals.assign(level.isKnown.size(), 0);
+        if (s_.hasLight) map.light.assign(level.isKnown.size(), 0);
         const glm::mat3 toLocal(glm::transpose(grid_.frame));
         for (uint32_t y = 0; y < level.height; ++y) {
             if (isStopped && isStopped()) return;
@@ -391,10 +394,12 @@ class Patcher {
                 if (level.isKnown[t] == 0) continue;
                 const glm::dvec2 at(i0 + x / k, j0 + y / k);
                 const SurfaceLook look = lookAt(over[t], at, grid_.step / k);
-                map.colours[t] = look.colour | (map.hasMaterials ? uint32_t{look.material} << 24 : 0u);
-                if (s_.hasMapNormals) map.normals[t] = roundedNormal<kMapNormalStep>(toLocal * look.normal);
+                if (s_.hasLight) map.light[t] = look.light;
+                if (hasColours) map.colours[t] = look.colour | (map.hasMaterials ? uint32_t{look.material} << 24 : 0u);
+                if (hasNormals) map.normals[t] = roundedNormal<kMapNormalStep>(toLocal * look.normal);
             }
         }
+        if (std::all_of(map.light.begin(), map.light.end(), [](uint32_t l) { return l == 0; })) map.light = {};
         sampleColours(patch);
     }
 

@@ -7,6 +7,7 @@
 
 #include "engine/base/numbers.h"
 #include "lod/builder/morton.h"
+#include "lod/primitives/patch_map.h"
 #include "lod/primitives/primitives.h"
 #include "lod/primitives/triangle.h"
 #include "shaders/shared/record.h"
@@ -280,6 +281,11 @@ SurfaceLook MeshSurface::look(size_t t, double b, double c, double side) const {
     const PlaceLook look = looks(source.surface[v[0]], place.uv, place.side);
     out.colour = litColour(colour, look.colour);
     out.material = look.material;
+    const uint32_t light = packLight(look.emission, look.isUnlit);
+    if (hasLight)
+        out.light = light;
+    else
+        out.colour = withEmission(out.colour, light);
     if (look.normal == glm::vec3(0, 0, 1)) return out;
     const glm::vec3 bumped = shared::bumpedNormal(out.normal, glm::vec3(e1), glm::vec3(e2), {place.d1.x, place.d1.y},
                                                   {place.d2.x, place.d2.y}, look.normal);

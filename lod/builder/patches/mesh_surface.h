@@ -24,6 +24,7 @@ struct SurfaceLook {
     glm::vec3 normal{0};  ///< unit, on the triangle's front side
     uint32_t colour = 0;  ///< sRGB
     uint8_t material = 0;
+    uint32_t light = 0;  ///< PatchMap::light
 };
 
 struct MeshSurface {
@@ -47,6 +48,7 @@ struct MeshSurface {
     uint32_t mapTexels = 1, mostDensity = PatchMap::kMostDensity;
     double texelSide = 0;
     bool hasMapNormals = false, hasMapMaterials = false;
+    bool hasLight = false;                    ///< looks say what sends light; else that is added to colours
     bool hasFineNormals = false;              ///< some of it is a mirror
     bool isTwoSided = false;                  ///< some triangles are, or they do not agree on a side
     uint64_t triangles = 0;                   ///< of the source

@@ -50,7 +50,8 @@ uint64_t fewestBytes(const Hierarchy& h, uint32_t chunk) {
 bool isPossibleWhole(const Hierarchy& h, uint32_t chunk) {
     const Payload& p = h.payload(chunk);
     return !h.isStochastic && p.parentCounts.lo == p.parentCounts.hi && p.ownCounts.lo == p.ownCounts.hi &&
-           p.errorCode == p.ownCounts.hi && (p.maps & ~(shared::kMapDensity | shared::kMapNormals)) == 0;
+           p.errorCode == p.ownCounts.hi &&
+           (p.maps & ~(shared::kMapDensity | shared::kMapNormals | shared::kMapLight)) == 0;
 }
 
 std::string checkPatches(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
