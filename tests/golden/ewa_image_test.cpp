@@ -192,6 +192,38 @@ TEST(Ewa, OneColourStaysOneColour) {
     }
 }
 
+/// Without a low-pass discs of a twentieth of a pixel weigh nothing at the centres of pixels: those that hold them have
+/// their depths and normals all the same.
+TEST(Ewa, DiscsThatWeighNothingHaveTheirOwnNormals) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    std::vector<test::TestPoint> points;
+    for (int y = -80; y <= 80; ++y)
+        for (int x = -80; x <= 80; ++x) points.push_back({{x / 128.0, y / 128.0, 0}, {0, 0, 1}, 0x00ff00u, 0.01f});
+    const size_t wall = points.size();
+    for (int y = -4; y <= 4; ++y)
+        for (int x = -4; x <= 4; ++x)
+            points.push_back({{x / 16.0, y / 16.0 + 0.002, 1}, {0.6f, 0, 0.8f}, 0x0000ffu, 0.0003f});
+    test::writePly(folder / "a.ply", points, true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.width = view.height = 101;
+    view.focalPixels = 300;
+    render::FrameSettings settings = blended();
+    settings.draw.lowPass = 0;
+    for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+        const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+        for (size_t i = wall; i < points.size(); ++i) {
+            const dvec3 p = points[i].position;
+            SCOPED_TRACE(testing::Message() << name << ": a disc at " << p.x << ", " << p.y);
+            const size_t at = static_cast<size_t>(50.5 - 150 * p.y) * 101 + static_cast<size_t>(50.5 + 150 * p.x);
+            EXPECT_NEAR(image.depth[at], 2, 0.01);
+            for (int c = 0; c < 3; ++c)
+                EXPECT_NEAR(image.normal[3 * at + static_cast<size_t>(c)], points[i].normal[c], 1e-3);
+        }
+    }
+}
+
 TEST(Ewa, LeavesNoHolesInClosedSurfaces) {
     size_t holes = 0, clear = 0, looked = 0;
     test::forViewsOfAClosedSurface(60, 128, -0.7, [&](const test::InsideView& v) {

@@ -11,6 +11,7 @@
 #include "engine/reference/reference.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/drawn_shapes.h"
+#include "tests/support/mode_checks.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -374,6 +375,7 @@ TEST(EwaVisibility, IsTheSameBytesForAnyOrderAndResidency) {
     };
     EXPECT_TRUE(isSame(draw(a, *some, nullptr)));
     EXPECT_TRUE(isSame(draw(a, *many, nullptr)));
+    EXPECT_TRUE(isSame(draw(a, *test::makeBackwardsExecutor(), nullptr))) << "the last pieces first";
     EXPECT_TRUE(isSame(draw(b, *some, nullptr))) << "another order";
     EXPECT_TRUE(isSame(draw(a, *some, &close))) << "more is resident";
     settings.draw.lowPass *= 1.01f;

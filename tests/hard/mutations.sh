@@ -3,7 +3,10 @@
 # that stands for the case then fails. In a copy of the tree (build/mutations), so that nothing of the tree is touched;
 # every test is first seen to pass there. WORD: only the mutations in whose line (case, file,
 # test, words) this regular expression is found: '^9 ' is case 9. Prints a line each, with what
-# the test says of the naive formula. Part of ./test --full.
+# the test says of the naive formula. Part of ./test --full. What is not seen to fail as it should (a formula that is no
+# longer there, a test that passes, is not found, or takes more than 15 minutes) makes the exit code 1.
+# mutations.sh --check: builds nothing; every formula of the list stands once in the tree, and its test is there. LIST
+# (environment): another list (names.sh plants wrong ones).
 #
 # Each test file is a program of its own there, built as the tree's build folder is, so that ccache has what did not
 # change. Of a formula in a header that half of the tree includes, a mutation names the files that are compiled with it
@@ -12,26 +15,49 @@
 set -u
 tree=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 copy=$tree/build/mutations
+list=${LIST:-$tree/tests/hard/mutations.list}
 word=${1:-}
+isChecking=
+if [ "$word" = --check ]; then
+    word=
+    isChecking=1
+    copy=$(mktemp -d)
+    trap 'rm -rf "$copy"' EXIT
+fi
+# (Of a file that bash cannot read to its end, it would take the first half.)
+bash -n "$list" || { echo "no list: $list"; exit 2; }
 status=0
 count=0
 declare -A passed=()
-kernels=engine/cpu/kernels_sse.cpp
-grep -q avx2 /proc/cpuinfo && kernels=engine/cpu/kernels_avx2.cpp
-grep -q avx512bw /proc/cpuinfo && kernels=engine/cpu/kernels_avx512.cpp
+set=sse  # the only kernels there: others would draw what they always draw
+grep -q avx2 /proc/cpuinfo && set=avx2
+grep -q avx512bw /proc/cpuinfo && set=avx512
+kernels=engine/cpu/kernels_$set.cpp
 
-refresh() {  # the tree's files as they are now; those that did not change keep their times
+# The tree's files as they are now; those that did not change keep their times, those that are gone go.
+refresh() {
     local f
-    while IFS= read -r -d '' f; do
-        cmp -s "$tree/$f" "$copy/$f" && continue
-        [ -f "$tree/$f" ] || continue
+    local -a files=(git -C "$tree" ls-files -z --cached --others --exclude-standard)
+    sums() { (cd "$1" && "${files[@]}" | xargs -0 -r cksum 2>/dev/null | sort); }
+    while IFS= read -r f; do
         mkdir -p "$copy/$(dirname "$f")"
         cp "$tree/$f" "$copy/$f"
-    done < <(git -C "$tree" ls-files -z --cached --others --exclude-standard)
+    done < <(comm -23 <(sums "$tree") <(sums "$copy") | cut -d ' ' -f 3-)
+    while IFS= read -r f; do
+        rm "$copy/$f"
+    done < <(comm -13 <("${files[@]}" | tr '\0' '\n' | sort) <(cd "$copy" && find apps engine lod shaders streaming tests -type f 2>/dev/null | sort))
 }
-# What compiles: through ccache, if there is one. A naive formula may leave something unused: no warnings of it.
+# What compiles: through ccache, if there is one. A naive formula may leave something unused: no warnings of it; and
+# kernels with one are not worth a minute of the compiler (what they compute does not hang on how well they are
+# compiled: nothing is contracted or put in another order).
 write_compiler() {
-    printf '#!/bin/sh\nno=\n[ -e "%s/mutated" ] && no=-w\nexec %s "$@" $no\n' "$copy" "$(command -v ccache)" >"$copy/compiler"
+    cat >"$copy/compiler" <<END
+#!/bin/sh
+no=
+[ -e "$copy/mutated" ] && no=-w
+case "\$no\$*" in -w*/kernels_*) no='-w -O1' ;; esac
+exec $(command -v ccache) "\$@" \$no
+END
     chmod +x "$copy/compiler"
 }
 build() { ninja -C "$copy/build" "$1" >"$copy/build.log" 2>&1; }
@@ -43,13 +69,40 @@ run() {  # PROGRAM FILTER: the test's own exit code; 200 where no test of that n
 }
 # FILE OLD NEW: the only place where OLD stands.
 swap() {
+    [ -f "$copy/$1" ] || { echo "not there: $1" >&2; return 1; }
     FROM=$2 TO=$3 perl -0777 -pi -e '
         my $n = () = /\Q$ENV{FROM}\E/g;
         die "stands $n times in $ARGV: $ENV{FROM}\n" if $n != 1;
         s/\Q$ENV{FROM}\E/$ENV{TO}/;' "$copy/$1"
 }
+# The files of a mutation's only=, or nothing where one of the globs has none.
+filesOf() { (cd "$1" && shopt -s failglob && echo $2) 2>/dev/null; }
+# As mutant, of files of the tree.
+check() {
+    local case=$1 test=$2 filter=$3 words=$4 name=${3#*.} file
+    local line="case $case: $words ($filter)"
+    shift 4
+    count=$((count + 1))
+    grep -qE "^TEST(_F|_P)?\\(${filter%%.*}, ${name/\*/[A-Za-z0-9]*}\\)" "$tree/tests/$test" ||
+        { echo "NOT THERE     $line: no such test in $test"; status=1; }
+    [ -z "${only:-}" ] || [ -n "$(filesOf "$tree" "$only")" ] || { echo "NOT THERE     $line: $only"; status=1; }
+    [ $# -gt 0 ] || { echo "NOT THERE     $line: it changes nothing"; status=1; }
+    rm -rf "${copy:?}/"*
+    while [ $# -gt 0 ]; do
+        file=$1
+        mkdir -p "$copy/$(dirname "$file")"
+        [ -e "$copy/$file" ] || cp "$tree/$file" "$copy/$file" 2>/dev/null
+        if [ "$2" = "${3-$2}" ] || ! swap "$file" "$2" "$3"; then
+            echo "NOT THERE     $line: the formula of $file"
+            status=1
+            return 0
+        fi
+        shift 3
+    done
+}
 # CASE TEST_FILE FILTER WORDS FILE OLD NEW [FILE OLD NEW ...]; before it: only='GLOB ...'
 mutant() {
+    if [ -n "$isChecking" ]; then check "$@"; return; fi
     local case=$1 program=single_$(basename "$2" .cpp) filter=$3 words=$4 globs=${only:-}
     [[ "$case $2 $filter $words" =~ $word ]] || return 0
     if [ -n "${isListing:-}" ]; then files+=("$2"); return 0; fi
@@ -79,6 +132,12 @@ mutant() {
         shift 3
     done
     if [ -n "$globs" ]; then  # all but these keep what they were compiled from
+        if [ -z "$(filesOf "$copy" "$globs")" ]; then
+            echo "NOT MEASURED  $line: no file is $globs"
+            status=1
+            changedBack
+            return
+        fi
         for f in "${changed[@]}"; do touch -r "$copy/before/$f" "$copy/$f"; done
         read -ra compiled < <(cd "$copy" && echo $globs)
         (cd "$copy" && touch "${compiled[@]}")
@@ -92,6 +151,13 @@ mutant() {
         status=1
     else
         local code=$?
+        # (What hangs may hang for another reason; of 200 see run().)
+        if [ $code -eq 124 ] || [ $code -eq 200 ]; then
+            echo "NOT MEASURED  $line: it ends with $code"
+            status=1
+            changedBack
+            return
+        fi
         said=$(grep -aA6 -m1 ': Failure' "$copy/run.log" | tail -n +2 | tr -s ' \n' ' ' | cut -c -150)
         [ -n "$said" ] || said="it stops with $code"
         echo "killed        $line: $(grep -ac ': Failure' "$copy/run.log") failures; $said"
@@ -108,21 +174,26 @@ changedBack() {
     [ ${#compiled[@]} -eq 0 ] || (cd "$copy" && touch "${compiled[@]}")
 }
 
+if [ -n "$isChecking" ]; then
+    source "$list"
+    [ $count -gt 0 ] || { echo "no mutations in $list"; exit 2; }
+    exit $status
+fi
 mkdir -p "$copy"
 rm -rf "$copy/mutated" "$copy/before"
 refresh
 write_compiler
 files=()
 isListing=1
-source "$tree/tests/hard/mutations.list"
+source "$list"
 isListing=
 [ ${#files[@]} -gt 0 ] || { echo "no mutation has '$word' in its line"; exit 2; }
 unity=OFF
 grep -qs '^CMAKE_UNITY_BUILD:[A-Z]*=ON' "$tree/build/CMakeCache.txt" && unity=ON
 export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$tree} CCACHE_NOHASHDIR=1
 cmake -S "$copy" -B "$copy/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSTIPPLE_GPU=OFF -DCMAKE_UNITY_BUILD=$unity \
-    -DCCACHE="$copy/compiler" -DSTIPPLE_SINGLE_TESTS="$(printf '%s\n' "${files[@]}" | sort -u | paste -sd ';')" \
+    -DSTIPPLE_KERNELS=$set -DCCACHE="$copy/compiler" -DSTIPPLE_SINGLE_TESTS="$(printf '%s\n' "${files[@]}" | sort -u | paste -sd ';')" \
     >"$copy/configure.log" 2>&1 || { echo "the copy is not configured: $copy/configure.log"; exit 1; }
-source "$tree/tests/hard/mutations.list"
+source "$list"
 echo "$count mutations"
 exit $status

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <utility>
 
 #include "engine/cpu/cpu_backend.h"
 #include "tests/support/drawn_discs.h"
@@ -26,7 +28,30 @@ std::vector<size_t> pixelsInside(Shape shape, const lod::View& view) {
     return out;
 }
 
+class BackwardsExecutor final : public Executor {
+  public:
+    void parallelFor(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) override {
+        const size_t step = std::max<size_t>(grain, 1);
+        for (size_t pieces = (count + step - 1) / step; pieces > 0; --pieces)
+            body((pieces - 1) * step, std::min(pieces * step, count));
+    }
+    void run(std::function<void()> task) override { tasks_.push_back(std::move(task)); }
+    void wait() override {
+        while (!tasks_.empty()) {
+            const auto task = std::move(tasks_.front());
+            tasks_.pop_front();
+            task();
+        }
+    }
+    int threads() const override { return 4; }
+
+  private:
+    std::deque<std::function<void()>> tasks_;
+};
+
 }  // namespace
+
+std::unique_ptr<Executor> makeBackwardsExecutor() { return std::make_unique<BackwardsExecutor>(); }
 
 size_t InsideView::openIn(const render::FrameSettings& settings) const {
     const render::Image image = draw(settings);
@@ -56,13 +81,13 @@ void forViewsOfAClosedSurface(int poses, uint32_t size, double nearest,
 
 void expectSameForAnyThreads(const render::FrameSettings& settings) {
     const TempFolder folder;
-    const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4);
+    const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4), backwards = makeBackwardsExecutor();
     writePly(folder / "a.ply", anyDiscs(30'000, 6), true, true);
     const auto store = buildAndOpen(folder / "a.ply", folder / "a.stipple", *four);
     lod::View view = viewFromAbove({0, 0, 0});
     view.width = 333;
     render::Image first;
-    for (Executor* executor : {one.get(), four.get()})
+    for (Executor* executor : {one.get(), four.get(), backwards.get()})
         for (auto& [name, backend] : cpuBackendsAndOracle(*executor)) {
             if (name == "fp64") continue;
             const render::Image image = renderView(store, *backend, *executor, view, settings);
@@ -71,7 +96,8 @@ void expectSameForAnyThreads(const render::FrameSettings& settings) {
                 EXPECT_GT(std::count_if(image.depth.begin(), image.depth.end(), [](float z) { return z > 0; }), 10'000);
             }
             EXPECT_TRUE(image.rgba == first.rgba && image.depth == first.depth && image.normal == first.normal)
-                << name << ", " << executor->threads() << " threads";
+                << name << ", " << executor->threads() << " threads"
+                << (executor == backwards.get() ? ", backwards" : "");
         }
 }
 

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
+#include "engine/base/executor.h"
 #include "engine/render/frame.h"
 #include "lod/cut/cut.h"
 
@@ -26,8 +28,12 @@ struct InsideView {
 void forViewsOfAClosedSurface(int poses, uint32_t size, double nearest,
                               const std::function<void(const InsideView&)>& each);
 
+/// Pieces one after the other, the last one first. (Four threads may come in the order of one, where a machine has
+/// other things to do; this is another order each time.)
+std::unique_ptr<Executor> makeBackwardsExecutor();
+
 /// The cpu backend draws 30,000 discs of any size as the same bytes (colour, depth, normal) with one thread and four,
-/// on every instruction set.
+/// and with the pieces of four backwards, on every instruction set.
 void expectSameForAnyThreads(const render::FrameSettings& settings);
 
 }  // namespace stipple::test

@@ -107,6 +107,42 @@ TEST(KernelFormulas, DiscsAreThoseOfSplatDisc) {
     });
 }
 
+/// Discs whose planes hold the eye, along diagonals of pixels, so that rays of pixels' centres lie in them but for
+/// rounding: where one meets its disc nothing of the plane is known, and the depth is one of the disc all the same.
+TEST(KernelFormulas, DiscsSeenEdgeOnAreNoFartherThanTheirRims) {
+    size_t drawn = 0;
+    forKernels([&](const cpu::Kernels& k, const FrameConstants& f) {
+        Rng rng(9);
+        std::vector<uint64_t> keys(size_t{f.width} * f.height, kNoKey);
+        std::vector<uint8_t> runs(keys.size() / cpu::Visibility::kRun + 1);
+        const uint32_t place = 0;
+        for (int round = 0; round < 3'000; ++round) {
+            const uint32_t left = 32 * static_cast<uint32_t>(rng.below(20)),
+                           top = 16 * static_cast<uint32_t>(rng.below(30));
+            // The tile's own diagonal: y is x + beside, px from the principal point.
+            const double x0 = double{left} - double{f.centre.x}, beside = double{top} - double{f.centre.y} - x0,
+                         x = x0 + rng.uniform(8, 16), z = std::exp2(rng.uniform(-4, 8)), focal = double{f.focal},
+                         perPixel = (f.orthographic == 0 ? z : 1) / focal;
+            const auto n = glm::normalize(glm::dvec3(focal, -focal, f.orthographic == 0 ? beside : 0));
+            const auto c = glm::vec3(glm::dvec3(x * perPixel, (x + beside) * perPixel, z));
+            const cpu::PlacedSplat disc{c.x, c.y, c.z, n.x, n.y, n.z, uniform(rng, 2, 8) * static_cast<float>(perPixel),
+                                        0};
+            k.splatTile(f, &disc, &place, 1, {left, top, 32, 16}, {keys.data(), runs.data()});
+            const float reach = disc.radius * std::sqrt(n.x * n.x + n.y * n.y);
+            for (uint32_t i = 0; i < 32 * 16; ++i) {
+                uint64_t& key = keys[(top + i / 32) * f.width + left + i % 32];
+                if (key != kNoKey) {
+                    ++drawn;
+                    // Depths are one over what is linear on the image: rounded twice; reaches are a little wider.
+                    EXPECT_NEAR(keyDepth(key), c.z, 1.0002f * reach + 0x1p-22f * c.z);
+                }
+                key = kNoKey;
+            }
+        }
+    });
+    EXPECT_GT(drawn, 1'000u);
+}
+
 TEST(KernelFormulas, PixelsAreThoseOfProjection) {
     forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
         Rng rng(2);
@@ -269,7 +305,7 @@ TEST(KernelFormulas, LightIsThatOfTheFormulas) {
         for (int round = 0; round < 100; ++round) {
             std::vector<vec3> expected;
             for (size_t i = 0; i < cpu::kTile; ++i) {
-                const glm::vec3 n =
+                const auto n =
                     glm::normalize(glm::vec3(uniform(rng, -1, 1), uniform(rng, -1, 1), uniform(rng, -1, -0.1)));
                 row->depth[i] = 5;
                 row->nx[i] = n.x;
