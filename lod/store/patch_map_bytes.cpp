@@ -15,7 +15,8 @@ using namespace streams;
 
 namespace {
 
-constexpr size_t kStreams = 4;  ///< what each patch has, colours, normals, materials
+constexpr size_t kStreams = 4;         ///< what each patch has, colours, normals, materials
+constexpr uint64_t kBytesOfTexel = 4;  // of any stream, at most
 constexpr uint8_t kHasNormals = shared::kMapNormals, kHasMaterials = shared::kMapMaterials,
                   kHasLight = shared::kMapLight;
 
@@ -208,7 +209,12 @@ PatchMapBytes encodeMaps(std::span<const Patch> patches) {
     return out;
 }
 
-bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const MapLimits& limits) {
+namespace {
+
+/// The streams of a payload, each of the length that the head states; false where they are not, or it states more than
+/// the patches of a node can have.
+bool unpack(std::span<const uint8_t> bytes, size_t patches, const MapLimits& limits,
+            std::array<Bytes, kStreams>& streams, Bytes& light) {
     MapSizes sizes{};
     if (bytes.size() < sizeof(sizes)) return false;
     std::memcpy(&sizes, bytes.data(), sizeof(sizes));
@@ -221,26 +227,32 @@ bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const 
     }
     uint64_t end = uint64_t{at} + more.packed;
     for (const uint32_t size : sizes.packed) end += size;
-    constexpr uint64_t kBytes = 4;  // of a texel, of any stream
-    const uint32_t mostDensity = limits.most & shared::kMapDensity;
-    const uint64_t mostTexels = texelsOfBlock(mostDensity) * limits.blocks;
-    if (end != bytes.size() || sizes.plain[0] != patches.size()) return false;
+    const uint64_t mostTexels = texelsOfBlock(limits.most & shared::kMapDensity) * limits.blocks;
+    if (end != bytes.size() || sizes.plain[0] != patches) return false;
     for (const uint32_t plain : sizes.plain)
-        if (plain > std::max<uint64_t>(kBytes * mostTexels, patches.size())) return false;
-    if (more.plain > kBytes * mostTexels) return false;
-    std::array<Bytes, kStreams> streams;
+        if (plain > std::max<uint64_t>(kBytesOfTexel * mostTexels, patches)) return false;
+    if (more.plain > kBytesOfTexel * mostTexels) return false;
     for (size_t k = 0; k < kStreams; ++k) {
         auto stream = decompress(bytes.subspan(at, sizes.packed.at(k)), sizes.plain.at(k));
         if (!stream) return false;
         streams.at(k) = std::move(*stream);
         at += sizes.packed.at(k);
     }
+    if (!limits.hasLight) return true;
+    auto stream = decompress(bytes.subspan(at, more.packed), more.plain);
+    if (!stream || stream->empty()) return false;
+    light = std::move(*stream);
+    return true;
+}
+
+}  // namespace
+
+bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const MapLimits& limits) {
+    std::array<Bytes, kStreams> streams;
     Plain plain;
-    if (limits.hasLight) {
-        auto stream = decompress(bytes.subspan(at, more.packed), more.plain);
-        if (!stream || stream->empty()) return false;
-        plain.light = std::move(*stream);
-    }
+    if (!unpack(bytes, patches.size(), limits, streams, plain.light)) return false;
+    const uint32_t mostDensity = limits.most & shared::kMapDensity;
+    const uint64_t mostTexels = texelsOfBlock(mostDensity) * limits.blocks;
     const Bytes& has = streams[0];
     uint64_t grid = 0, drawn = 0, drawnLight = 0;
     for (size_t k = 0; k < patches.size(); ++k) {
@@ -255,7 +267,7 @@ bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const 
         drawn += p.map.density > 0 ? texels : 0;
         drawnLight += (has[k] & kHasLight) != 0 ? texels : 0;
     }
-    if (3 * drawn > streams[1].size() || kBytes * drawnLight > plain.light.size() ||
+    if (3 * drawn > streams[1].size() || kBytesOfTexel * drawnLight > plain.light.size() ||
         grid > kMostTexels + kGridsABlock * mostTexels)
         return false;
     std::vector<MapLevel> levels(patches.size());
@@ -275,7 +287,7 @@ bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const 
     plain.materials = std::move(streams[3]);
     if (plain.texels + plain.withLight == 0 || plain.colours.size() != 3 * plain.texels ||
         plain.normals.size() != 4 * plain.withNormals || plain.materials.size() != plain.withMaterials ||
-        plain.light.size() != kBytes * plain.withLight)
+        plain.light.size() != kBytesOfTexel * plain.withLight)
         return false;
     for (size_t k = 0; k < patches.size(); ++k) {
         Patch& p = patches[k];
