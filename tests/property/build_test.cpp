@@ -181,7 +181,14 @@ TEST(Build, EveryCountFromOneToSixteenWorks) {
                     const reference::Disc d = reference::decodeDisc(h, h.nodes[n], r);
                     ++records;
                     EXPECT_GT(d.radius, 0);
-                    if (count > 1) EXPECT_LE(d.radius, 1.5 * extent) << "of neighbours that are there";
+                    double nearest = extent;
+                    for (const test::TestPoint& other : points)
+                        if (const double by = glm::distance(other.position, d.position); by > 1e-3 * extent)
+                            nearest = std::min(nearest, by);
+                    if (count > 1) {
+                        EXPECT_LE(d.radius, 1.5 * extent) << "of neighbours that are there";
+                        EXPECT_GE(d.radius, 0.25 * nearest) << "no dot";
+                    }
                     EXPECT_TRUE(std::isfinite(d.normal.x + d.normal.y + d.normal.z));
                     if (count <= 2) EXPECT_NE(d.flags & shared::kFlagNoNormal, 0u) << "two points have no plane";
                 }

@@ -393,6 +393,7 @@ TEST(LeafDiscs, CloseTheSurfaceHoweverThePointsAreSpread) {
 
 struct Directions {
     size_t points = 0, without = 0, off = 0;  ///< off: by more than 45 degrees
+    double leastRadius = 1e300;
 };
 /// `normalAt`: the true one.
 Directions directionsOf(const std::vector<test::TestPoint>& points, bool isFine,
@@ -411,6 +412,7 @@ Directions directionsOf(const std::vector<test::TestPoint>& points, bool isFine,
         found.without += (d.flags & shared::kFlagNoNormal) != 0;
         found.off += (d.flags & shared::kFlagNoNormal) == 0 &&
                      std::abs(glm::dot(d.normal, normalAt(d.position))) < std::sqrt(0.5);
+        found.leastRadius = std::min(found.leastRadius, d.radius);
     }
     return found;
 }
@@ -429,6 +431,7 @@ TEST(LeafDiscs, PointsOfALineHaveNoNormal) {
                 const Directions d = directionsOf(points, isFine, [](const glm::dvec3& p) { return p; });
                 EXPECT_EQ(d.points, points.size());
                 EXPECT_EQ(d.without, d.points) << (isFine ? "fine" : "auto") << " along " << towards.x;
+                if (isEven) EXPECT_GE(d.leastRadius, 0.5 * 0.005) << "each meets the next one";
             }
         }
 }

@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "lod/builder/points/seen.h"
 #include "lod/builder/points/select.h"
@@ -369,7 +370,7 @@ class Estimator : Surroundings<K> {
             inverseExtents(neighbourhood_.neighbours(), {p.x, p.y, p.z}, first, second, most);
         if (isLine)  // only the two along it count
             for (size_t k = 0; k < kDirections; ++k)
-                if (k % (kDirections / 2) != 0) inverse.at(k) = 3.4e38f;
+                if (k % (kDirections / 2) != 0) inverse.at(k) = std::numeric_limits<float>::infinity();
         float radius = kOverlap * farthestCorner(inverse, most, isUneven || isLine || window.widestGap > 0);
         if (!(radius > 0)) radius = kPlain * spacing;
         isStray_ = window.mayBeAlone && settings_.limitStrays && rank == kNeighbours &&

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "engine/base/wide.h"
 #include "lod/builder/points/select.h"
@@ -194,8 +195,9 @@ float farthestCorner(const std::array<float, kDirections>& inverse, float most, 
     std::memcpy(&around[1], inverse.data(), sizeof inverse);
     around[0] = around[kDirections];
     around[kDirections + 1] = around[1];
-    const int32_t found = leastCorner(around.data(), 0.5f / most,
-                                      isUneven ? 1e20f : kSteepest);  // twice the distance is 1 over the value
+    // Twice the distance is 1 over the value: no distance over an infinite one, which hides no other.
+    const int32_t found =
+        leastCorner(around.data(), 0.5f / most, isUneven ? std::numeric_limits<float>::infinity() : kSteepest);
     return found < kNothing ? 0.5f / std::bit_cast<float>(found) : 0.0f;
 }
 
