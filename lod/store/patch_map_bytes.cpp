@@ -15,8 +15,7 @@ using namespace streams;
 
 namespace {
 
-constexpr size_t kStreams = 4;         ///< what each patch has, colours, normals, materials
-constexpr uint64_t kBytesOfTexel = 4;  // of any stream, at most
+constexpr size_t kStreams = 4;  ///< what each patch has, colours, normals, materials
 constexpr uint8_t kHasNormals = shared::kMapNormals, kHasMaterials = shared::kMapMaterials,
                   kHasLight = shared::kMapLight;
 
@@ -211,10 +210,32 @@ PatchMapBytes encodeMaps(std::span<const Patch> patches) {
 
 namespace {
 
-/// The streams of a payload, each of the length that the head states; false where they are not, or it states more than
-/// the patches of a node can have.
-bool unpack(std::span<const uint8_t> bytes, size_t patches, const MapLimits& limits,
-            std::array<Bytes, kStreams>& streams, Bytes& light) {
+constexpr uint64_t kTexelBytes = 4;  // of any stream, at most
+
+/// What maps each patch has; false: others than are allowed, or so large that no streams of colours and light of those
+/// sizes (bytes) justify them.
+bool takeKinds(const Bytes& has, uint64_t colours, uint64_t light, const MapLimits& limits, std::span<Patch> patches) {
+    const uint32_t mostDensity = limits.most & shared::kMapDensity;
+    uint64_t grid = 0, drawn = 0, drawnLight = 0;
+    for (size_t k = 0; k < patches.size(); ++k) {
+        Patch& p = patches[k];
+        p.map.density = has[k] & shared::kMapDensity;
+        if (has[k] > 31 || (p.map.density == 0 && (has[k] & ~kHasLight) != 0) || p.map.density > mostDensity)
+            return false;
+        if ((has[k] & (kHasNormals | kHasLight) & ~limits.most) != 0) return false;
+        if (has[k] == 0) continue;
+        grid += ((uint64_t{p.width - 1} << p.map.density) + 1) * ((uint64_t{p.height - 1} << p.map.density) + 1);
+        const uint64_t texels = uint64_t{p.drawnCells()} << 2 * p.map.density;  // at least
+        drawn += p.map.density > 0 ? texels : 0;
+        drawnLight += (has[k] & kHasLight) != 0 ? texels : 0;
+    }
+    return 3 * drawn <= colours && kTexelBytes * drawnLight <= light &&
+           grid <= kMostTexels + kGridsABlock * texelsOfBlock(mostDensity) * limits.blocks;
+}
+
+}  // namespace
+
+bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const MapLimits& limits) {
     MapSizes sizes{};
     if (bytes.size() < sizeof(sizes)) return false;
     std::memcpy(&sizes, bytes.data(), sizeof(sizes));
@@ -228,48 +249,25 @@ bool unpack(std::span<const uint8_t> bytes, size_t patches, const MapLimits& lim
     uint64_t end = uint64_t{at} + more.packed;
     for (const uint32_t size : sizes.packed) end += size;
     const uint64_t mostTexels = texelsOfBlock(limits.most & shared::kMapDensity) * limits.blocks;
-    if (end != bytes.size() || sizes.plain[0] != patches) return false;
+    if (end != bytes.size() || sizes.plain[0] != patches.size()) return false;
     for (const uint32_t plain : sizes.plain)
-        if (plain > std::max<uint64_t>(kBytesOfTexel * mostTexels, patches)) return false;
-    if (more.plain > kBytesOfTexel * mostTexels) return false;
+        if (plain > std::max<uint64_t>(kTexelBytes * mostTexels, patches.size())) return false;
+    if (more.plain > kTexelBytes * mostTexels) return false;
+    std::array<Bytes, kStreams> streams;
     for (size_t k = 0; k < kStreams; ++k) {
         auto stream = decompress(bytes.subspan(at, sizes.packed.at(k)), sizes.plain.at(k));
         if (!stream) return false;
         streams.at(k) = std::move(*stream);
         at += sizes.packed.at(k);
     }
-    if (!limits.hasLight) return true;
-    auto stream = decompress(bytes.subspan(at, more.packed), more.plain);
-    if (!stream || stream->empty()) return false;
-    light = std::move(*stream);
-    return true;
-}
-
-}  // namespace
-
-bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const MapLimits& limits) {
-    std::array<Bytes, kStreams> streams;
     Plain plain;
-    if (!unpack(bytes, patches.size(), limits, streams, plain.light)) return false;
-    const uint32_t mostDensity = limits.most & shared::kMapDensity;
-    const uint64_t mostTexels = texelsOfBlock(mostDensity) * limits.blocks;
-    const Bytes& has = streams[0];
-    uint64_t grid = 0, drawn = 0, drawnLight = 0;
-    for (size_t k = 0; k < patches.size(); ++k) {
-        Patch& p = patches[k];
-        p.map.density = has[k] & 3u;
-        if (has[k] > 31 || (p.map.density == 0 && (has[k] & ~kHasLight) != 0) || p.map.density > mostDensity)
-            return false;
-        if ((has[k] & (kHasNormals | kHasLight) & ~limits.most) != 0) return false;
-        if (has[k] == 0) continue;
-        grid += ((uint64_t{p.width - 1} << p.map.density) + 1) * ((uint64_t{p.height - 1} << p.map.density) + 1);
-        const uint64_t texels = uint64_t{p.drawnCells()} << 2 * p.map.density;  // at least
-        drawn += p.map.density > 0 ? texels : 0;
-        drawnLight += (has[k] & kHasLight) != 0 ? texels : 0;
+    if (limits.hasLight) {
+        auto stream = decompress(bytes.subspan(at, more.packed), more.plain);
+        if (!stream || stream->empty()) return false;
+        plain.light = std::move(*stream);
     }
-    if (3 * drawn > streams[1].size() || kBytesOfTexel * drawnLight > plain.light.size() ||
-        grid > kMostTexels + kGridsABlock * mostTexels)
-        return false;
+    const Bytes& has = streams[0];
+    if (!takeKinds(has, streams[1].size(), plain.light.size(), limits, patches)) return false;
     std::vector<MapLevel> levels(patches.size());
     for (size_t k = 0; k < patches.size(); ++k) {
         Patch& p = patches[k];
@@ -287,7 +285,7 @@ bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const 
     plain.materials = std::move(streams[3]);
     if (plain.texels + plain.withLight == 0 || plain.colours.size() != 3 * plain.texels ||
         plain.normals.size() != 4 * plain.withNormals || plain.materials.size() != plain.withMaterials ||
-        plain.light.size() != kBytesOfTexel * plain.withLight)
+        plain.light.size() != kTexelBytes * plain.withLight)
         return false;
     for (size_t k = 0; k < patches.size(); ++k) {
         Patch& p = patches[k];
