@@ -170,19 +170,40 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/ewa.inl"
 
+/// Not 0 where a value is above it. (As whole numbers: of comparisons of floats that are joined GCC makes no SIMD.)
+[[gnu::always_inline]] inline int aboveZero(float value) {
+    const int bits = __builtin_bit_cast(int, value);
+    return bits > 0 ? bits : 0;
+}
 /// Of the groups of kTexelGroup texels of a row, those in which one of the rows holds any: a bit each.
 template <typename... Depths>
 [[gnu::always_inline]] inline uint32_t groupsHeld(uint32_t n, const Depths* __restrict... depths) {
-    uint32_t held = 0, rest = 0;
+    uint32_t held = 0;
+    int rest = 0;
     const uint32_t whole = n / kTexelGroup;
     for (uint32_t group = 0; group < whole; ++group) {
-        uint32_t any = 0;
-        for (size_t i = 0; i < kTexelGroup; ++i)
-            any |= ((depths[group * kTexelGroup + i] > 0.0f ? 1u : 0u) | ...);
-        held |= any << group;
+        int any = 0;
+        for (size_t i = 0; i < kTexelGroup; ++i) any |= (aboveZero(depths[group * kTexelGroup + i]) | ...);
+        held |= (any != 0 ? 1u : 0u) << group;
     }
-    for (size_t i = size_t{whole} * kTexelGroup; i < n; ++i) rest |= ((depths[i] > 0.0f ? 1u : 0u) | ...);
-    return held | rest << whole;
+    for (size_t i = size_t{whole} * kTexelGroup; i < n; ++i) rest |= (aboveZero(depths[i]) | ...);
+    return held | (rest != 0 ? 1u : 0u) << whole;
+}
+/// Of `groups`, those in which one of the values is above 0; others are not read.
+[[gnu::always_inline]] inline uint32_t groupsHeldOf(uint32_t groups, uint32_t n, const float* __restrict values) {
+    uint32_t held = 0;
+    for (uint32_t rest = groups; rest != 0u; rest &= rest - 1u) {
+        const auto group = uint32_t(__builtin_ctz(rest));
+        const float* const first = values + group * kTexelGroup;
+        const uint32_t count = n - group * kTexelGroup;
+        int any = 0;
+        if (count >= kTexelGroup)
+            for (size_t i = 0; i < kTexelGroup; ++i) any |= aboveZero(first[i]);
+        else
+            for (size_t i = 0; i < count; ++i) any |= aboveZero(first[i]);
+        held |= (any != 0 ? 1u : 0u) << group;
+    }
+    return held;
 }
 /// Calls use(first, last) for groups side by side: what is the same for all texels is read once for all of them.
 template <typename Use>

@@ -77,94 +77,117 @@ struct alignas(64) MirrorLanes {
     }
 }
 
-[[gnu::always_inline]] inline void followRays(const FrameConstants& f, const float* __restrict depths, uint32_t steps,
-                                              size_t count, MirrorLanes& lanes) {
+/// Groups of rays of which some go on.
+[[gnu::always_inline]] inline uint32_t groupsGoing(const MirrorLanes& __restrict m, uint32_t groups, float step,
+                                                   size_t count) {
+    alignas(64) float going[kTile];
+    forGroups(groups, uint32_t(count), [&](size_t first, size_t last) __attribute__((always_inline)) {
+        for (size_t i = first; i < last; ++i) going[i] = m.found[i] > 0.0f ? 0.0f : m.steps[i] - step;
+    });
+    return groupsHeldOf(groups, uint32_t(count), going);
+}
+
+/// From step `from` on, which no ray that is not there yet has passed behind something after.
+[[gnu::always_inline]] inline void followRays(const FrameConstants& f, const float* __restrict depths, uint32_t groups,
+                                              uint32_t from, uint32_t steps, size_t count, MirrorLanes& lanes) {
     MirrorLanes& __restrict m = lanes;
     const Lens lens = lensHere(f.focal);
     const float width = float(int(f.width)), height = float(int(f.height));
     const int pitch = int(f.width);
-    constexpr uint32_t kLook = 8;  // steps after which rays are looked at whether any goes on
+    constexpr uint32_t kLook = 4;  // steps after which rays are looked at whether any goes on
     for (size_t i = 0; i < count; ++i) m.isInFront[i] = 1.0f;
-    for (uint32_t step = 1; step <= steps; ++step) {
+    uint32_t going = groupsGoing(m, groups, 0.0f, count);
+    for (uint32_t step = from; step <= steps && going != 0u; ++step) {
         const float k = float(int(step));
+        forGroups(going, uint32_t(count), [&](size_t first, size_t last) __attribute__((always_inline)) {
 #pragma GCC ivdep
-        for (size_t i = 0; i < count; ++i) {
-            const float share = k / max(m.steps[i], 1.0f);
-            const float x = m.x[i] + share * m.dx[i], y = m.y[i] + share * m.dy[i];
-            const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], share);
-            const float depth = depths[mirrorPixel(y, height) * pitch + mirrorPixel(x, width)];
-            const float behind = mirrorBehind(z, depth);
-            const float found = m.found[i], mayMeet = (found > 0.0f ? 0.0f : m.isInFront[i]);
-            const float isNew = (k > m.passed[i] ? 1.0f : 0.0f) * (k <= m.steps[i] ? 1.0f : 0.0f);
-            const float meets = mayMeet * isNew * (behind > 0.0f ? 1.0f : 0.0f);
-            m.found[i] = meets > 0.5f ? k : found;
-            m.isInFront[i] = behind > 0.0f ? 0.0f : 1.0f;
-        }
-        if (step % kLook != 0) continue;
-        uint32_t going = 0;
-        for (size_t i = 0; i < count; ++i) going |= (m.found[i] > 0.0f) | (k >= m.steps[i]) ? 0u : 1u;
-        if (going == 0) return;
+            for (size_t i = first; i < last; ++i) {
+                const float share = k / max(m.steps[i], 1.0f);
+                const float x = m.x[i] + share * m.dx[i], y = m.y[i] + share * m.dy[i];
+                const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], share);
+                const float depth = depths[mirrorPixel(y, height) * pitch + mirrorPixel(x, width)];
+                const float behind = mirrorBehind(z, depth);
+                const float found = m.found[i], mayMeet = (found > 0.0f ? 0.0f : m.isInFront[i]);
+                const float isNew = (k > m.passed[i] ? 1.0f : 0.0f) * (k <= m.steps[i] ? 1.0f : 0.0f);
+                const float meets = mayMeet * isNew * (behind > 0.0f ? 1.0f : 0.0f);
+                m.found[i] = meets > 0.5f ? k : found;
+                m.isInFront[i] = behind > 0.0f ? 0.0f : 1.0f;
+            }
+        });
+        if (step % kLook == 0) going = groupsGoing(m, going, k, count);
     }
 }
 
-[[gnu::always_inline]] inline void narrowSteps(const FrameConstants& f, const float* __restrict depths, size_t count,
-                                               MirrorLanes& lanes) {
+[[gnu::always_inline]] inline void narrowSteps(const FrameConstants& f, const float* __restrict depths, uint32_t groups,
+                                               size_t count, MirrorLanes& lanes) {
     MirrorLanes& __restrict m = lanes;
     const Lens lens = lensHere(f.focal);
     const float width = float(int(f.width)), height = float(int(f.height));
     const int pitch = int(f.width);
+    forGroups(groups, uint32_t(count), [&](size_t first, size_t last) __attribute__((always_inline)) {
 #pragma GCC ivdep
-    for (size_t i = 0; i < count; ++i) {
-        const float inverse = 1.0f / max(m.steps[i], 1.0f);
-        m.low[i] = max(m.found[i] - 1.0f, 0.0f) * inverse;
-        m.high[i] = m.found[i] * inverse;
-    }
-    for (uint32_t h = 0; h < kMirrorHalvings; ++h)
-#pragma GCC ivdep
-        for (size_t i = 0; i < count; ++i) {
-            const float share = 0.5f * (m.low[i] + m.high[i]);
-            const float x = m.x[i] + share * m.dx[i], y = m.y[i] + share * m.dy[i];
-            const float depth = depths[mirrorPixel(y, height) * pitch + mirrorPixel(x, width)];
-            const bool isBehind = mirrorBehind(mirrorDepth(lens, m.linear[i], m.dLinear[i], share), depth) > 0.0f;
-            m.low[i] = isBehind ? m.low[i] : share;
-            m.high[i] = isBehind ? share : m.high[i];
+        for (size_t i = first; i < last; ++i) {
+            const float inverse = 1.0f / max(m.steps[i], 1.0f);
+            m.low[i] = max(m.found[i] - 1.0f, 0.0f) * inverse;
+            m.high[i] = m.found[i] * inverse;
         }
+        for (uint32_t h = 0; h < kMirrorHalvings; ++h)
+#pragma GCC ivdep
+            for (size_t i = first; i < last; ++i) {
+                const float share = 0.5f * (m.low[i] + m.high[i]);
+                const float x = m.x[i] + share * m.dx[i], y = m.y[i] + share * m.dy[i];
+                const float depth = depths[mirrorPixel(y, height) * pitch + mirrorPixel(x, width)];
+                const bool isBehind =
+                    mirrorBehind(mirrorDepth(lens, m.linear[i], m.dLinear[i], share), depth) > 0.0f;
+                m.low[i] = isBehind ? m.low[i] : share;
+                m.high[i] = isBehind ? share : m.high[i];
+            }
+    });
 }
 
-/// Rays that are too far behind what they were to meet go on, the others do not; false if none does.
-[[gnu::always_inline]] inline bool passBehind(const FrameConstants& f, const float* __restrict depths,
-                                              const uint32_t* __restrict normals, size_t count, MirrorLanes& lanes) {
+/// Rays that are too far behind what they were to meet go on, the others do not: groups of which some do. `from`: the
+/// first step that one of them has come to.
+[[gnu::always_inline]] inline uint32_t passBehind(const FrameConstants& f, const float* __restrict depths,
+                                                  const uint32_t* __restrict normals, uint32_t groups, size_t count,
+                                                  MirrorLanes& lanes, uint32_t& from) {
     MirrorLanes& __restrict m = lanes;
     const Lens lens = lensHere(f.focal);
     const float width = float(int(f.width)), height = float(int(f.height));
     const float centreX = f.centre.x, centreY = f.centre.y;
     const int pitch = int(f.width);
     alignas(64) float passes[kTile];
+    forGroups(groups, uint32_t(count), [&](size_t first, size_t last) __attribute__((always_inline)) {
 #pragma GCC ivdep
-    for (size_t i = 0; i < count; ++i) {
-        const float x = m.x[i] + m.high[i] * m.dx[i], y = m.y[i] + m.high[i] * m.dy[i];
-        const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], m.high[i]), back = m.high[i] - m.onePixel[i];
-        const float zBack = mirrorDepth(lens, m.linear[i], m.dLinear[i], back);
-        const int column = mirrorPixel(x, width), line = mirrorPixel(y, height), at = line * pitch + column;
-        const float on = kMirrorAhead * m.onePixel[i];
-        const int next = mirrorPixel(y + on * m.dy[i], height) * pitch + mirrorPixel(x + on * m.dx[i], width);
-        const vec3 toEye = towardsEye(lens, float(column) + 0.5f - centreX, float(line) + 0.5f - centreY);
-        const vec3 n = octDecode(normals[at]);
-        m.off[i] = mirrorOff(lens, z, zBack, depths[at], std::abs(dot(n, toEye)), depths[next]);
-        const float meets = mirrorMeets(m.off[i], n, vec3(m.rx[i], m.ry[i], m.rz[i])) ? 1.0f : 0.0f;
-        passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (1.0f - meets);
-    }
-    float any = 0.0f;
-    for (size_t i = 0; i < count; ++i) any = max(any, passes[i]);
+        for (size_t i = first; i < last; ++i) {
+            const float x = m.x[i] + m.high[i] * m.dx[i], y = m.y[i] + m.high[i] * m.dy[i];
+            const float z = mirrorDepth(lens, m.linear[i], m.dLinear[i], m.high[i]),
+                        back = m.high[i] - m.onePixel[i];
+            const float zBack = mirrorDepth(lens, m.linear[i], m.dLinear[i], back);
+            const int column = mirrorPixel(x, width), line = mirrorPixel(y, height), at = line * pitch + column;
+            const float on = kMirrorAhead * m.onePixel[i];
+            const int next = mirrorPixel(y + on * m.dy[i], height) * pitch + mirrorPixel(x + on * m.dx[i], width);
+            const vec3 toEye = towardsEye(lens, float(column) + 0.5f - centreX, float(line) + 0.5f - centreY);
+            const vec3 n = octDecode(normals[at]);
+            m.off[i] = mirrorOff(lens, z, zBack, depths[at], std::abs(dot(n, toEye)), depths[next]);
+            const float meets = mirrorMeets(m.off[i], n, vec3(m.rx[i], m.ry[i], m.rz[i])) ? 1.0f : 0.0f;
+            passes[i] = (m.found[i] > 0.0f ? 1.0f : 0.0f) * (1.0f - meets);
+        }
+    });
+    const uint32_t going = groupsHeldOf(groups, uint32_t(count), passes);
+    float least = 3.0e38f;
+    forGroups(groups, uint32_t(count), [&](size_t first, size_t last) __attribute__((always_inline)) {
+        for (size_t i = first; i < last; ++i) least = passes[i] > 0.0f ? min(least, m.found[i]) : least;
 #pragma GCC ivdep
-    for (size_t i = 0; i < count; ++i) {
-        const bool goesOn = passes[i] > 0.0f;
-        m.steps[i] = (goesOn ? 1.0f : m.found[i]) > 0.0f ? m.steps[i] : 0.0f;
-        m.passed[i] = goesOn ? m.found[i] : m.passed[i];
-        m.things[i] += goesOn ? 1.0f : 0.0f;
-        m.found[i] = goesOn ? 0.0f : m.found[i];
-    }
-    return any > 0.0f;
+        for (size_t i = first; i < last; ++i) {
+            const bool goesOn = passes[i] > 0.0f;
+            m.steps[i] = (goesOn ? 1.0f : m.found[i]) > 0.0f ? m.steps[i] : 0.0f;
+            m.passed[i] = goesOn ? m.found[i] : m.passed[i];
+            m.things[i] += goesOn ? 1.0f : 0.0f;
+            m.found[i] = goesOn ? 0.0f : m.found[i];
+        }
+    });
+    from = going != 0u ? uint32_t(int(least)) : 1u;
+    return going;
 }
 
 /// Where rays meet something, and how much that counts.
@@ -196,14 +219,18 @@ struct alignas(64) MirrorLanes {
 struct MetRow {
     alignas(64) float x[kTile], y[kTile], share[kTile];  // px from the principal point
     SurfaceRow row;
+    /// What else it has is of other rows, and of pixels that are not lit.
     void clear(const ReflectionInput& in, uint32_t n) {
-        row = SurfaceRow{};
+        row.shadowSlots = 0;
         row.hasTriangles = row.hasMaterials = true;
         row.hasOcclusion = in.hasOcclusion;
         row.hasEmission = in.emissive != nullptr;
         row.placeX = x;
         row.placeY = y;
-        for (uint32_t i = 0; i < n; ++i) row.material[i] = kPixelTriangle | kPixelUnlit;
+        for (uint32_t i = 0; i < n; ++i) {
+            row.depth[i] = 0.0f;
+            row.material[i] = kPixelTriangle | kPixelUnlit;
+        }
     }
     /// Gives the share that it counts, if only as nothing.
     float take(const FrameConstants& f, const ReflectionInput& in, uint32_t i, const MirrorTap& tap, vec3 direction) {
@@ -272,11 +299,11 @@ bool reflectRow(const FrameConstants& frame, const ReflectionInput& in, uint32_t
     size_t count = takeMirrors(f, in, first, float(int(x0)) + 0.5f - f.centre.x, n, m);
     if (count == 0) return false;
     startRays(f, in.constants, py, count, m);
-    bool goesOn = true;
-    for (uint32_t tries = 0; goesOn && tries < kMirrorTries; ++tries) {
-        followRays(f, in.depth, in.constants.steps, count, m);
-        narrowSteps(f, in.depth, count, m);
-        goesOn = passBehind(f, in.depth, in.normal, count, m);
+    uint32_t going = (1u << (count + kTexelGroup - 1) / kTexelGroup) - 1u, from = 1;
+    for (uint32_t tries = 0; going != 0u && tries < kMirrorTries; ++tries) {
+        followRays(f, in.depth, going, from, in.constants.steps, count, m);
+        narrowSteps(f, in.depth, going, count, m);
+        going = passBehind(f, in.depth, in.normal, going, count, m, from);
     }
     weighHits(f, in, py, count, m);
     count = keepHits(m, count);
@@ -291,7 +318,7 @@ bool reflectRow(const FrameConstants& frame, const ReflectionInput& in, uint32_t
         m.metR[i] = m.metG[i] = m.metB[i] = m.counted[i] = 0.0f;
     }
     const vec2 size(float(int(f.width)), float(int(f.height)));
-    thread_local MetRow met;
+    thread_local MetRow met{};
     for (uint32_t tap = 0; tap < 4; ++tap) {
         met.clear(in, n);
         for (size_t i = 0; i < count; ++i)

@@ -1,183 +1,312 @@
-// Masks of lights that cast shadows, for the pixels of a row (shaders/shared/shadow.h). Included by kernels.inl, once
-// per instruction set.
+// Masks of lights that cast shadows, for the pixels of a row (shaders/shared/shadow.h), by groups of kTexelGroup pixels
+// of which some are for a map. Included by kernels.inl, once per instruction set.
 
-/// Pixels of a row that a light may fall on, closed up; and what is left of them for the next map.
+/// The pixels of a row in camera space.
 struct alignas(64) ShadowPixels {
-    uint32_t at[kTile];
-    float x[kTile], y[kTile], z[kTile], nx[kTile], ny[kTile], nz[kTile], leaf[kTile], reach2[kTile];
+    float x[kTile], y[kTile], z[kTile], reach2[kTile];
+    float left[kTile];  ///< 1: for the next maps of the light, else 0
 };
 /// As a map sees them.
 struct alignas(64) ShadowPlaces {
-    float x[kTile], y[kTile], depth[kTile], slopeX[kTile], slopeY[kTile], whole[kTile], state[kTile];
-    uint32_t word[kTile];
+    float x[kTile], y[kTile], depth[kTile], slopeX[kTile], slopeY[kTile], whole[kTile];
+    float isOn[kTile];  ///< 1: it is this map that says what comes to the pixel, else 0
+    [[gnu::always_inline]] ShadowPlace at(size_t i) const {
+        ShadowPlace s;
+        s.x = x[i];
+        s.y = y[i];
+        s.depth = depth[i];
+        s.slopeX = slopeX[i];
+        s.slopeY = slopeY[i];
+        s.whole = whole[i];
+        return s;
+    }
 };
-constexpr float kOffMap = 0.0f, kOnMap = 1.0f;
+/// Of lights that have a size.
+struct alignas(64) ShadowTaps {
+    float firstX[kTile], firstY[kTile];  ///< firstGolden
+    float x[kTile], y[kTile];            ///< the direction that is next
+    float reach[kTile], sum[kTile], count[kTile];
+    float radius[kTile];  ///< penumbraOf
+    float isWide[kTile];  ///< 1: it has one, else 0
+    float red[kTile], green[kTile], blue[kTile];
+};
 
-[[gnu::always_inline]] inline size_t takeSeen(const FrameConstants& f, const SurfaceRow& row, uint32_t x0, uint32_t y,
-                                              uint32_t n, ShadowPixels& p, float& nearest) {
+/// `groups`: with a surface.
+[[gnu::always_inline]] inline void placePixels(const FrameConstants& f, const SurfaceRow& __restrict row, uint32_t x0,
+                                               uint32_t y, uint32_t groups, uint32_t n, ShadowPixels& __restrict p) {
     const Lens lens = lensHere(f.focal);
     const float inverse = 1.0f / f.focal, offX = float(int(x0)) + 0.5f - f.centre.x,
                 offY = float(int(y)) + 0.5f - f.centre.y;
-    size_t count = 0;
-    for (uint32_t i = 0; i < n; ++i) {
-        if (!(row.depth[i] > 0.0f)) continue;
-        p.at[count] = i;
-        p.z[count] = row.depth[i];
-        p.nx[count] = row.nx[i];
-        p.ny[count] = row.ny[i];
-        p.nz[count] = row.nz[i];
-        p.leaf[count++] = row.leaf[i];
+    for (size_t i = 0; i < n; ++i) {
+        p.x[i] = offX + float(int(i));
+        p.y[i] = offY;
     }
-    nearest = 3.0e38f;
-    for (size_t k = 0; k < count; ++k) {
-        p.x[k] = row.placeX != nullptr ? row.placeX[p.at[k]] : offX + float(int(p.at[k]));
-        p.y[k] = row.placeY != nullptr ? row.placeY[p.at[k]] : offY;
-    }
-    for (size_t k = 0; k < count; ++k) {
-        const vec3 c = alongRay(pixelRay(lens, p.x[k] * inverse, p.y[k] * inverse), p.z[k]);
-        p.x[k] = c.x;
-        p.y[k] = c.y;
-        p.reach2[k] = c.x * c.x + c.y * c.y + c.z * c.z;
-        nearest = min(nearest, p.reach2[k]);
-    }
-    return count;
+    if (row.placeX != nullptr)
+        for (size_t i = 0; i < n; ++i) {
+            p.x[i] = row.placeX[i];
+            p.y[i] = row.placeY[i];
+        }
+    forGroups(groups, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+#pragma GCC ivdep
+        for (size_t i = first; i < last; ++i) {
+            const vec3 c = alongRay(pixelRay(lens, p.x[i] * inverse, p.y[i] * inverse), row.depth[i]);
+            p.x[i] = c.x;
+            p.y[i] = c.y;
+            p.z[i] = c.z;
+            p.reach2[i] = c.x * c.x + c.y * c.y + c.z * c.z;
+        }
+    });
 }
 
+/// What is turned away from a light gets none of it: it needs no mask.
+[[gnu::always_inline]] inline void leaveFacing(const ShadowMap& m, const SurfaceRow& __restrict row, size_t first,
+                                               size_t last, ShadowPixels& __restrict p) {
+    const vec3 forward = m.forward;
+    const float mayBeAway = m.isPerspective == 0u ? 1.0f : 0.0f;
+#pragma GCC ivdep
+    for (size_t i = first; i < last; ++i) {
+        const bool isAway = dot(forward, vec3(row.nx[i], row.ny[i], row.nz[i])) >= 0.0f;
+        const float away = (isAway ? mayBeAway : 0.0f) * (row.leaf[i] < 0.5f ? 1.0f : 0.0f);
+        p.left[i] = row.depth[i] > 0.0f ? 1.0f - away : 0.0f;
+    }
+}
+
+/// Groups of which some pixels are left and near enough for a map.
+[[gnu::always_inline]] inline uint32_t groupsWithin(const ShadowPixels& __restrict p, float reach2, uint32_t groups,
+                                                    uint32_t n) {
+    alignas(64) float within[kTile];
+    forGroups(groups, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+        for (size_t i = first; i < last; ++i) within[i] = p.reach2[i] <= reach2 ? p.left[i] : 0.0f;
+    });
+    return groupsHeldOf(groups, n, within);
+}
+
+/// Pixels that are on a map are left for none of the next.
 template <bool isPerspective>
-[[gnu::always_inline]] inline void placeOnMap(const ShadowMap& map, const ShadowPixels& pixels, size_t count,
-                                              float focal, ShadowPlaces& out) {
+[[gnu::always_inline]] inline void placeOnMap(const ShadowMap& map, float focal, size_t first, size_t last,
+                                              ShadowPixels& pixels, const SurfaceRow& __restrict row,
+                                              ShadowPlaces& out) {
     const ShadowMap m = map;
-    const ShadowPixels& __restrict p = pixels;
+    ShadowPixels& __restrict p = pixels;
     ShadowPlaces& __restrict o = out;
     const Lens lens = lensHere(focal);
+    const float edge = float(int(m.edge));
 #pragma GCC ivdep
-    for (size_t k = 0; k < count; ++k) {
-        const vec3 point = vec3(p.x[k], p.y[k], p.z[k]), normal = vec3(p.nx[k], p.ny[k], p.nz[k]);
-        const ShadowPlace s = shadowPlace(m, isPerspective, point, normal, lensDepth(lens, p.z[k]));
-        o.x[k] = s.x;
-        o.y[k] = s.y;
-        o.depth[k] = s.depth;
-        o.slopeX[k] = s.slopeX;
-        o.slopeY[k] = s.slopeY;
-        o.whole[k] = s.whole;
-        const float edge = float(int(m.edge));
-        const bool isOn = (s.x >= 0.0f) & (s.x < edge) & (s.y >= 0.0f) & (s.y < edge) &
-                          (!isPerspective | (s.whole > 0.0f)) & (p.reach2[k] <= m.reach2);
-        o.state[k] = isOn ? kOnMap : kOffMap;
+    for (size_t i = first; i < last; ++i) {
+        const vec3 point = vec3(p.x[i], p.y[i], p.z[i]), normal = vec3(row.nx[i], row.ny[i], row.nz[i]);
+        const ShadowPlace s = shadowPlace(m, isPerspective, point, normal, lensDepth(lens, p.z[i]));
+        o.x[i] = s.x;
+        o.y[i] = s.y;
+        o.depth[i] = s.depth;
+        o.slopeX[i] = s.slopeX;
+        o.slopeY[i] = s.slopeY;
+        o.whole[i] = s.whole;
+        const bool isHeld = (s.x >= 0.0f) & (s.x < edge) & (s.y >= 0.0f) & (s.y < edge) &
+                            (!isPerspective | (s.whole > 0.0f)) & (p.reach2[i] <= m.reach2);
+        const float left = p.left[i];
+        o.isOn[i] = isHeld ? left : 0.0f;
+        p.left[i] = isHeld ? 0.0f : left;
     }
 }
 
 /// Borders are hard, and no leaf is met.
-[[gnu::always_inline]] inline void hardShadows(const ShadowMap& map, const float* __restrict depths, size_t count,
-                                               ShadowPlaces& places) {
+[[gnu::always_inline]] inline void hardShadows(const ShadowMap& map, const float* __restrict depths, size_t first,
+                                               size_t last, const ShadowPlaces& __restrict o,
+                                               uint32_t* __restrict word) {
     const ShadowMap m = map;
-    ShadowPlaces& __restrict o = places;
 #pragma GCC ivdep
-    for (size_t k = 0; k < count; ++k) {
-        ShadowPlace s;
-        s.x = o.x[k];
-        s.y = o.y[k];
-        s.depth = o.depth[k];
-        s.slopeX = o.slopeX[k];
-        s.slopeY = o.slopeY[k];
+    for (size_t i = first; i < last; ++i) {
+        const ShadowPlace s = o.at(i);
         const uint32_t share = uint32_t(int(shadowShare(depths, nullptr, m, s, s.x, s.y) * 1023.0f + 0.5f));
-        o.word[k] = share | share << 10 | share << 20;
+        const uint32_t before = word[i];
+        word[i] = o.isOn[i] > 0.5f ? share | share << 10 | share << 20 : before;
     }
 }
 
-/// `at`: of each place, its pixel of row `y` from `x0` on.
-[[gnu::always_inline]] inline void softShadows(const ShadowMap& m, const float* depths, const uint32_t* through,
-                                               size_t count, const uint32_t* at, uint32_t x0, uint32_t y, uint32_t seed,
-                                               ShadowPlaces& o) {
-    for (size_t k = 0; k < count; ++k) {
-        ShadowPlace s;
-        s.x = o.x[k];
-        s.y = o.y[k];
-        s.depth = o.depth[k];
-        s.slopeX = o.slopeX[k];
-        s.slopeY = o.slopeY[k];
-        s.whole = o.whole[k];
-        o.word[k] = packLight(lightPast(depths, through, m, s, firstGolden(x0 + at[k], y, seed)));
+/// How wide penumbras are.
+template <bool isPerspective>
+[[gnu::always_inline]] inline void findPenumbras(const ShadowMap& map, const float* __restrict depths, size_t first,
+                                                 size_t last, const ShadowPlaces& __restrict o, ShadowTaps& taps) {
+    const ShadowMap m = map;
+    ShadowTaps& __restrict t = taps;
+#pragma GCC ivdep
+    for (size_t i = first; i < last; ++i) {
+        t.reach[i] = casterReach(m, isPerspective, o.at(i));
+        t.x[i] = t.firstX[i];
+        t.y[i] = t.firstY[i];
+        t.sum[i] = 0.0f;
+        t.count[i] = 0.0f;
     }
-}
-
-/// Keeps the places of `o` that are on the map at its beginning, and pixels that are for other maps at that of `p`.
-[[gnu::always_inline]] inline size_t sortOut(ShadowPixels& p, size_t& left, ShadowPlaces& o, uint32_t* __restrict at) {
-    size_t on = 0, off = 0;
-    for (size_t k = 0; k < left; ++k) {
-        if (o.state[k] == kOnMap) {
-            at[on] = p.at[k];
-            o.x[on] = o.x[k];
-            o.y[on] = o.y[k];
-            o.depth[on] = o.depth[k];
-            o.slopeX[on] = o.slopeX[k];
-            o.slopeY[on] = o.slopeY[k];
-            o.whole[on++] = o.whole[k];
-            continue;
+    for (uint32_t k = 0; k < kShadowTaps; ++k)
+#pragma GCC ivdep
+        for (size_t i = first; i < last; ++i) {
+            ShadowCasters c;
+            c.direction = vec2(t.x[i], t.y[i]);
+            c.sum = t.sum[i];
+            c.count = t.count[i];
+            c = lookForCaster(depths, nullptr, m, o.at(i), t.reach[i], k, c);
+            t.x[i] = c.direction.x;
+            t.y[i] = c.direction.y;
+            t.sum[i] = c.sum;
+            t.count[i] = c.count;
         }
-        p.at[off] = p.at[k];
-        p.x[off] = p.x[k];
-        p.y[off] = p.y[k];
-        p.z[off] = p.z[k];
-        p.nx[off] = p.nx[k];
-        p.ny[off] = p.ny[k];
-        p.nz[off] = p.nz[k];
-        p.leaf[off] = p.leaf[k];
-        p.reach2[off++] = p.reach2[k];
+#pragma GCC ivdep
+    for (size_t i = first; i < last; ++i) {
+        ShadowCasters c;
+        c.direction = vec2(0.0f, 0.0f);
+        c.sum = t.sum[i];
+        c.count = t.count[i];
+        t.radius[i] = penumbraOf(m, isPerspective, o.at(i), t.reach[i], c);
     }
-    left = off;
-    return on;
 }
 
-/// What is turned away from a light gets none of it: it needs no mask.
-[[gnu::always_inline]] inline size_t facing(const ShadowMap& m, ShadowPixels& p, size_t count) {
-    size_t kept = 0;
-    for (size_t k = 0; k < count; ++k) {
-        const vec3 n = vec3(p.nx[k], p.ny[k], p.nz[k]);
-        if (m.isPerspective == 0u && dot(m.forward, n) >= 0.0f && p.leaf[k] < 0.5f) continue;
-        p.at[kept] = p.at[k];
-        p.x[kept] = p.x[k];
-        p.y[kept] = p.y[k];
-        p.z[kept] = p.z[k];
-        p.nx[kept] = n.x;
-        p.ny[kept] = n.y;
-        p.nz[kept] = n.z;
-        p.leaf[kept] = p.leaf[k];
-        p.reach2[kept++] = p.reach2[k];
+/// Adds what comes past at place number k.
+template <bool hasLeaves>
+[[gnu::always_inline]] inline void addPast(const ShadowMap& m, const float* __restrict depths,
+                                           const uint32_t* __restrict through, uint32_t k, size_t first, size_t last,
+                                           const ShadowPlaces& __restrict o, ShadowTaps& taps) {
+    ShadowTaps& __restrict t = taps;
+#pragma GCC ivdep
+    for (size_t i = first; i < last; ++i) {
+        const vec2 direction = vec2(t.x[i], t.y[i]);
+        const vec3 past = lightInPenumbra(depths, through, m, hasLeaves, o.at(i), t.radius[i], k, direction);
+        const vec2 next = turnedGolden(direction);
+        t.x[i] = next.x;
+        t.y[i] = next.y;
+        t.red[i] += past.x;
+        if (!hasLeaves) continue;
+        t.green[i] += past.y;
+        t.blue[i] += past.z;
     }
-    return kept;
+}
+
+/// Of lights that have a size, and past leaves. `groups`: with pixels on the map.
+template <bool isPerspective, bool hasLeaves>
+[[gnu::always_inline]] inline void softShadows(const ShadowMap& map, const float* depths, const uint32_t* through,
+                                               uint32_t groups, uint32_t n, const ShadowPlaces& __restrict o,
+                                               ShadowTaps& taps, uint32_t* __restrict word) {
+    const ShadowMap m = map;
+    ShadowTaps& __restrict t = taps;
+    const auto each = [&](uint32_t of, const auto& use) __attribute__((always_inline)) {
+        forGroups(of & groups, n, use);
+    };
+    if (m.size > 0.0f)
+        each(
+            groups, [&](size_t first, size_t last)
+                        __attribute__((always_inline)) { findPenumbras<isPerspective>(m, depths, first, last, o, t); });
+    else
+        each(groups, [&](size_t first, size_t last) __attribute__((always_inline)) {
+    // Where nothing is in the way, leaves need not be looked at.
+#pragma GCC ivdep
+            for (size_t i = first; i < last; ++i) {
+                const ShadowPlace s = o.at(i);
+                t.radius[i] = shadowShare(depths, nullptr, m, s, s.x, s.y) < 1.0f ? 0.0f : -1.0f;
+            }
+        });
+    alignas(64) float isMet[kTile];
+    each(groups, [&](size_t first, size_t last) __attribute__((always_inline)) {
+#pragma GCC ivdep
+        for (size_t i = first; i < last; ++i) {
+            const float radius = t.radius[i];
+            isMet[i] = radius >= 0.0f ? o.isOn[i] : 0.0f;
+            t.isWide[i] = radius > 0.0f ? o.isOn[i] : 0.0f;
+            t.x[i] = t.firstX[i];
+            t.y[i] = t.firstY[i];
+            t.red[i] = t.green[i] = t.blue[i] = 0.0f;
+        }
+    });
+    const uint32_t met = groupsHeldOf(groups, n, isMet), wide = groupsHeldOf(groups, n, t.isWide);
+    const auto add = [&](uint32_t k, uint32_t of) __attribute__((always_inline)) {
+        each(
+            of, [&](size_t first, size_t last)
+                    __attribute__((always_inline)) { addPast<hasLeaves>(m, depths, through, k, first, last, o, t); });
+    };
+    add(0, met);
+    // Of borders that are hard in a penumbra's neighbourhood the first place is all there is.
+    alignas(64) float one[3][kTile];
+    each(wide, [&](size_t first, size_t last) __attribute__((always_inline)) {
+        for (size_t i = first; i < last; ++i) {
+            one[0][i] = t.red[i];
+            one[1][i] = t.green[i];
+            one[2][i] = t.blue[i];
+        }
+    });
+    for (uint32_t k = 1; k < kShadowTaps && wide != 0u; ++k) add(k, wide);
+    each(wide, [&](size_t first, size_t last) __attribute__((always_inline)) {
+        constexpr float kInverse = 1.0f / float(int(kShadowTaps));
+#pragma GCC ivdep
+        for (size_t i = first; i < last; ++i) {
+            const bool isWide = t.isWide[i] > 0.5f;
+            t.red[i] = isWide ? t.red[i] * kInverse : one[0][i];
+            t.green[i] = isWide ? t.green[i] * kInverse : one[1][i];
+            t.blue[i] = isWide ? t.blue[i] * kInverse : one[2][i];
+        }
+    });
+    each(met, [&](size_t first, size_t last) __attribute__((always_inline)) {
+#pragma GCC ivdep
+        for (size_t i = first; i < last; ++i) {
+            const float red = t.red[i];
+            const uint32_t past = packLight(vec3(red, hasLeaves ? t.green[i] : red, hasLeaves ? t.blue[i] : red));
+            const uint32_t before = word[i];
+            word[i] = isMet[i] > 0.5f ? past : before;
+        }
+    });
 }
 
 void shadowRow(const FrameConstants& frame, const ShadowInput& in, uint32_t x0, uint32_t y, uint32_t n,
                SurfaceRow& __restrict row) {
     const FrameConstants f = frame;
-    ShadowPixels seen, p;
+    ShadowPixels p;
     ShadowPlaces o;
-    uint32_t at[kTile];
-    float nearest = 0;
-    const size_t count = takeSeen(f, row, x0, y, n, seen, nearest);
+    ShadowTaps t;
+    const uint32_t seen = groupsHeld(n, row.depth);
+    placePixels(f, row, x0, y, seen, n, p);
     for (uint32_t s = 0; s < in.slots; ++s)
         for (size_t i = 0; i < n; ++i) row.shadow[s][i] = kAllLight;
     row.shadowSlots = in.slots;
-    uint32_t slot = ~0u;
-    size_t left = 0;
+    bool hasTaps = false;
+    uint32_t slot = ~0u, left = 0;
     for (uint32_t k = 0; k < in.count; ++k) {
         const ShadowMap& m = in.maps[k];
         if (m.slot != slot) {
-            p = seen;
             slot = m.slot;
-            left = facing(m, p, count);
+            left = seen;
+            forGroups(seen, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+                leaveFacing(m, row, first, last, p);
+            });
         }
-        if (left == 0 || m.reach2 < nearest) continue;
-        if (m.isPerspective != 0u)
-            placeOnMap<true>(m, p, left, f.focal, o);
+        left = groupsHeldOf(left, n, p.left);
+        const uint32_t groups = groupsWithin(p, m.reach2, left, n);
+        if (groups == 0u) continue;
+        const bool isPerspective = m.isPerspective != 0u;
+        forGroups(groups, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+            if (isPerspective)
+                placeOnMap<true>(m, f.focal, first, last, p, row, o);
+            else
+                placeOnMap<false>(m, f.focal, first, last, p, row, o);
+        });
+        const uint32_t on = groupsHeldOf(groups, n, o.isOn);
+        uint32_t* const word = row.shadow[slot];
+        if (!(m.size > 0.0f) && m.hasLeaves == 0u) {
+            forGroups(on, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+                hardShadows(m, in.depths[k], first, last, o, word);
+            });
+            continue;
+        }
+        if (!hasTaps)
+            for (size_t i = 0; i < n; ++i) {
+                const vec2 first = firstGolden(x0 + uint32_t(i), y, f.coverageSeed);
+                t.firstX[i] = first.x;
+                t.firstY[i] = first.y;
+            }
+        hasTaps = true;
+        if (isPerspective && m.hasLeaves != 0u)
+            softShadows<true, true>(m, in.depths[k], in.through[k], on, n, o, t, word);
+        else if (isPerspective)
+            softShadows<true, false>(m, in.depths[k], in.through[k], on, n, o, t, word);
+        else if (m.hasLeaves != 0u)
+            softShadows<false, true>(m, in.depths[k], in.through[k], on, n, o, t, word);
         else
-            placeOnMap<false>(m, p, left, f.focal, o);
-        const size_t on = sortOut(p, left, o, at);
-        if (m.size > 0.0f || m.hasLeaves != 0u)
-            softShadows(m, in.depths[k], in.through[k], on, at, x0, y, f.coverageSeed, o);
-        else
-            hardShadows(m, in.depths[k], on, o);
-        for (size_t i = 0; i < on; ++i) row.shadow[slot][at[i]] = o.word[i];
+            softShadows<false, false>(m, in.depths[k], in.through[k], on, n, o, t, word);
     }
 }

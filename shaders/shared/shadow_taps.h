@@ -35,59 +35,57 @@ SHARED_FN vec3 shadowColour(SHARED_SHADOW ShadowMap m, ShadowPlace p, float x, f
                 ofTexels(t, v00.z, v10.z, v01.z, v11.z));
 }
 
-// Radius of the penumbra at a place, texels. 0: the border is hard there; less: nothing hides the light. `first`: of
-// firstGolden.
-SHARED_FN float penumbra(SHARED_SHADOW ShadowMap m, ShadowPlace p, vec2 first) {
-    const bool isFar = m.isPerspective == 0u;
-    const float most = kMostPenumbra * float(int(m.edge));
-    // The light seen from the place covers so much of the map, at the depth of the nearest caster.
-    const float gap = max(p.whole - m.nearest, 0.0f);
-    const float search =
-        min(isFar ? gap * m.size * m.focal : gap * m.size * m.focal / (p.whole * max(m.nearest, 1.0e-20f)), most);
-    vec2 direction = first;
-    float sum = 0.0f;
-    float count = 0.0f;
+// What casts about a place: looked for at sixteen others, one after another.
+struct ShadowCasters {
+    vec2 direction;  // in which the next one lies
+    float sum;       // of the depths of those that were met ...
+    float count;     // ... so many
+};
+SHARED_FN ShadowCasters noCasters(vec2 first) {
+    ShadowCasters c;
+    c.direction = first;
+    c.sum = 0.0f;
+    c.count = 0.0f;
+    return c;
+}
+// How far about the place, texels: the light seen from it covers so much of the map, at the depth of the nearest
+// caster.
+SHARED_FN float casterReach(ShadowMap m, bool isPerspective, ShadowPlace p) {
+    const float gap = max(p.whole - m.nearest, 0.0f) * m.size * m.focal;
+    return min(isPerspective ? gap / (p.whole * max(m.nearest, 1.0e-20f)) : gap, kMostPenumbra * float(int(m.edge)));
+}
+// Place number k. (From the place itself on: what is near and narrow must not be missed.)
+SHARED_FN ShadowCasters lookForCaster(SHARED_SHADOW ShadowMap m, ShadowPlace p, float reach, uint k, ShadowCasters c) {
     const float last = float(int(m.edge)) - 1.0f;
-    for (uint k = 0u; k < kShadowTaps; ++k) {
-        // (From the place itself on: what is near and narrow must not be missed.)
-        const float radius = search * sqrt(float(int(k)) / float(int(kShadowTaps)));
-        const float column = floor(min(max(0.0f, p.x + radius * direction.x), last));
-        const float row = floor(min(max(0.0f, p.y + radius * direction.y), last));
-        const float depth = shadowDepths[m.first + uint(int(row)) * m.edge + uint(int(column))];
-        const bool isHidden = depth < shadowLimit(p, column, row);
-        sum += isHidden ? depth : 0.0f;
-        count += isHidden ? 1.0f : 0.0f;
-        direction = turnedGolden(direction);
-    }
-    const float caster = sum / max(count, 1.0f);
+    const float radius = reach * sqrt(float(int(k)) / float(int(kShadowTaps)));
+    const float column = floor(min(max(0.0f, p.x + radius * c.direction.x), last));
+    const float row = floor(min(max(0.0f, p.y + radius * c.direction.y), last));
+    const float depth = shadowDepths[m.first + uint(int(row)) * m.edge + uint(int(column))];
+    const bool isHidden = depth < shadowLimit(p, column, row);
+    ShadowCasters next;
+    next.direction = turnedGolden(c.direction);
+    next.sum = c.sum + (isHidden ? depth : 0.0f);
+    next.count = c.count + (isHidden ? 1.0f : 0.0f);
+    return next;
+}
+// Radius of the penumbra, texels, after all of them. 0: the border is hard there; less: nothing hides the light.
+SHARED_FN float penumbraOf(ShadowMap m, bool isPerspective, ShadowPlace p, float reach, ShadowCasters c) {
+    const float caster = c.sum / max(c.count, 1.0f);
     const float apart = max(p.whole - caster, 0.0f) * m.size * m.focal;
-    const float radius = min(isFar ? apart : apart / (p.whole * max(caster, 1.0e-20f)), most);
-    return count > 0.0f ? radius : search < 1.0f ? 0.0f : -1.0f;
+    const float radius =
+        min(isPerspective ? apart / (p.whole * max(caster, 1.0e-20f)) : apart, kMostPenumbra * float(int(m.edge)));
+    return c.count > 0.0f ? radius : reach < 1.0f ? 0.0f : -1.0f;
 }
 
-// What of the light comes to a place. `first`: of firstGolden.
-SHARED_FN vec3 lightPast(SHARED_SHADOW ShadowMap m, ShadowPlace p, vec2 first) {
-    const float radius = m.size > 0.0f ? penumbra(SHARED_SHADOW_USE m, p, first) : 0.0f;
-    if (radius < 0.0f) return vec3(1.0f, 1.0f, 1.0f);
-    vec3 sum = vec3(0.0f, 0.0f, 0.0f);
-    vec2 direction = first;
-    const uint taps = radius > 0.0f ? kShadowTaps : 1u;
-    for (uint k = 0u; k < taps; ++k) {
-        const float off = radius * sqrt((float(int(k)) + 0.5f) / float(int(kShadowTaps)));
-        const float x = p.x + off * direction.x;
-        const float y = p.y + off * direction.y;
-        vec3 past;
-        if (m.hasLeaves != 0u) {
-            past = shadowColour(SHARED_SHADOW_USE m, p, x, y);
-        } else {
-            const float share = shadowShare(SHARED_SHADOW_USE m, p, x, y);
-            past = vec3(share, share, share);
-        }
-        sum = vec3(sum.x + past.x, sum.y + past.y, sum.z + past.z);
-        direction = turnedGolden(direction);
-    }
-    const float inverse = 1.0f / float(int(taps));
-    return vec3(sum.x * inverse, sum.y * inverse, sum.z * inverse);
+// What comes past at place number k of a penumbra, which lies in that direction.
+SHARED_FN vec3 lightInPenumbra(SHARED_SHADOW ShadowMap m, bool hasLeaves, ShadowPlace p, float radius, uint k,
+                               vec2 direction) {
+    const float off = radius * sqrt((float(int(k)) + 0.5f) / float(int(kShadowTaps)));
+    const float x = p.x + off * direction.x;
+    const float y = p.y + off * direction.y;
+    if (hasLeaves) return shadowColour(SHARED_SHADOW_USE m, p, x, y);
+    const float share = shadowShare(SHARED_SHADOW_USE m, p, x, y);
+    return vec3(share, share, share);
 }
 
 SHARED_END
