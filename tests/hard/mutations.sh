@@ -21,8 +21,6 @@ isChecking=
 if [ "$word" = --check ]; then
     word=
     isChecking=1
-    copy=$(mktemp -d)
-    trap 'rm -rf "$copy"' EXIT
 fi
 # (Of a file that bash cannot read to its end, it would take the first half.)
 bash -n "$list" || { echo "no list: $list"; exit 2; }
@@ -77,32 +75,37 @@ swap() {
 }
 # The files of a mutation's only=, or nothing where one of the globs has none.
 filesOf() { (cd "$1" && shopt -s failglob && echo $2) 2>/dev/null; }
-# As mutant, of files of the tree.
-check() {
-    local case=$1 test=$2 filter=$3 words=$4 name=${3#*.} file
-    local line="case $case: $words ($filter)"
-    shift 4
-    count=$((count + 1))
-    grep -qE "^TEST(_F|_P)?\\(${filter%%.*}, ${name/\*/[A-Za-z0-9]*}\\)" "$tree/tests/$test" ||
-        { echo "NOT THERE     $line: no such test in $test"; status=1; }
-    [ -z "${only:-}" ] || [ -n "$(filesOf "$tree" "$only")" ] || { echo "NOT THERE     $line: $only"; status=1; }
-    [ $# -gt 0 ] || { echo "NOT THERE     $line: it changes nothing"; status=1; }
-    rm -rf "${copy:?}/"*
-    while [ $# -gt 0 ]; do
-        file=$1
-        mkdir -p "$copy/$(dirname "$file")"
-        [ -e "$copy/$file" ] || cp "$tree/$file" "$copy/$file" 2>/dev/null
-        if [ "$2" = "${3-$2}" ] || ! swap "$file" "$2" "$3"; then
-            echo "NOT THERE     $line: the formula of $file"
-            status=1
-            return 0
-        fi
-        shift 3
-    done
+# What mutant is called with, NUL after each, in the tree: one process for all of them.
+checkAll() {
+    cd "$tree" && perl -0 -e '
+        my ($count, $status) = (0, 0);
+        sub slurp { open(my $in, "<", $_[0]) or return undef; local $/; return scalar <$in>; }
+        chomp(my @fields = <STDIN>);
+        while (@fields) {
+            my ($n, $only) = splice(@fields, 0, 2);
+            my ($case, $test, $filter, $words, @swaps) = splice(@fields, 0, $n);
+            my $bad = sub { print "NOT THERE     case $case: $words ($filter): $_[0]\n"; $status = 1; };
+            my ($suite, $name) = split(/\./, $filter, 2);
+            $name = join("[A-Za-z0-9]*", map { quotemeta } split(/\*/, $name, -1));
+            (slurp("tests/$test") // "") =~ /^TEST(_F|_P)?\($suite, $name\)/m or $bad->("no such test in $test");
+            for my $glob (split(" ", $only)) { grep { -e } glob($glob) or $bad->($glob); }
+            $bad->("not files, formulas and naive formulas") if !@swaps || @swaps % 3;
+            my %text;
+            while (my ($file, $old, $new) = splice(@swaps, 0, 3)) {
+                $text{$file} //= slurp($file);
+                my $times = () = ($text{$file} // "") =~ /\Q$old\E/g;
+                $bad->("its formula stands $times times in $file") if $times != 1;
+                $bad->("it changes nothing") if $old eq ($new // $old);
+                $text{$file} =~ s/\Q$old\E/$new/ if $times == 1;
+            }
+            ++$count;
+        }
+        print "no mutations\n" if !$count;
+        exit($count ? $status : 2);'
 }
 # CASE TEST_FILE FILTER WORDS FILE OLD NEW [FILE OLD NEW ...]; before it: only='GLOB ...'
 mutant() {
-    if [ -n "$isChecking" ]; then check "$@"; return; fi
+    if [ -n "$isChecking" ]; then printf '%s\0' $# "${only:-}" "$@"; return; fi
     local case=$1 program=single_$(basename "$2" .cpp) filter=$3 words=$4 globs=${only:-}
     [[ "$case $2 $filter $words" =~ $word ]] || return 0
     if [ -n "${isListing:-}" ]; then files+=("$2"); return 0; fi
@@ -175,9 +178,8 @@ changedBack() {
 }
 
 if [ -n "$isChecking" ]; then
-    source "$list"
-    [ $count -gt 0 ] || { echo "no mutations in $list"; exit 2; }
-    exit $status
+    source "$list" | checkAll
+    exit
 fi
 mkdir -p "$copy"
 rm -rf "$copy/mutated" "$copy/before"

@@ -120,8 +120,9 @@ TEST(KernelFormulas, DiscsSeenEdgeOnAreNoFartherThanTheirRims) {
             const uint32_t left = 32 * static_cast<uint32_t>(rng.below(20)),
                            top = 16 * static_cast<uint32_t>(rng.below(30));
             // The tile's own diagonal: y is x + beside, px from the principal point.
-            const double x0 = double{left} - double{f.centre.x}, beside = double{top} - double{f.centre.y} - x0,
-                         x = x0 + rng.uniform(8, 16), z = std::exp2(rng.uniform(-4, 8)), focal = double{f.focal},
+            const double x0 = static_cast<double>(left) - double{f.centre.x},
+                         beside = static_cast<double>(top) - double{f.centre.y} - x0, x = x0 + rng.uniform(8, 16),
+                         z = std::exp2(rng.uniform(-4, 8)), focal = double{f.focal},
                          perPixel = (f.orthographic == 0 ? z : 1) / focal;
             const auto n = glm::normalize(glm::dvec3(focal, -focal, f.orthographic == 0 ? beside : 0));
             const auto c = glm::vec3(glm::dvec3(x * perPixel, (x + beside) * perPixel, z));
