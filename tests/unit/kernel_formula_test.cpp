@@ -124,7 +124,7 @@ TEST(KernelFormulas, DiscsSeenEdgeOnAreNoFartherThanTheirRims) {
                          beside = static_cast<double>(top) - double{f.centre.y} - x0, x = x0 + rng.uniform(8, 16),
                          z = std::exp2(rng.uniform(-4, 8)), focal = double{f.focal},
                          perPixel = (f.orthographic == 0 ? z : 1) / focal;
-            const auto n = glm::normalize(glm::dvec3(focal, -focal, f.orthographic == 0 ? beside : 0));
+            const auto n = glm::vec3(glm::normalize(glm::dvec3(focal, -focal, f.orthographic == 0 ? beside : 0)));
             const auto c = glm::vec3(glm::dvec3(x * perPixel, (x + beside) * perPixel, z));
             const cpu::PlacedSplat disc{c.x, c.y, c.z, n.x, n.y, n.z, uniform(rng, 2, 8) * static_cast<float>(perPixel),
                                         0};
