@@ -84,8 +84,8 @@ void drawFull(const OverlayFacts& f) {
     if (const std::string text = effectsText(render::effectStatus(f.state, f.settings.frame.draw)); !text.empty())
         line("effects: " + text);
     line(fmt::format("delivered {} (asked for {:.2f} px)", errorText(c), budgets.errorPixels));
-    line(fmt::format("{} nodes, {} missing, {} hidden, {} left coarse, {} chunks on their way", c.nodesDrawn,
-                     c.nodesMissing, c.nodesHidden, c.nodesLeftCoarse, c.requestsInFlight));
+    line(fmt::format("{} nodes, {} missing, {} hidden, {} chunks on their way", c.nodesDrawn, c.nodesMissing,
+                     c.nodesHidden, c.requestsInFlight));
     ImGui::ProgressBar(static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(budgets.records),
                        ImVec2(300 * unit(), 0),
                        fmt::format("{} of {}", drawnText(f.state), roughly(budgets.records)).c_str());

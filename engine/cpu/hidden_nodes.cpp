@@ -120,7 +120,8 @@ std::span<const uint32_t> HiddenNodes::begin(const Frame& frame, bool mayHide) {
     states_.assign(points.nodes.size(), kDrawn);
     isTested_ = mayHide && frame.draws->pointBounds.size() == points.nodes.size() &&
                 (hasMarks_ || frame.tellsHiddenNodes || --untilTest_ == 0);
-    if (isTested_ && hasMarks_)
+    // What is told must not hang on frames before: everything is drawn first then, and all is held against all.
+    if (isTested_ && hasMarks_ && !frame.tellsHiddenNodes)
         for (size_t n = 0; n < states_.size(); ++n)
             if (points.nodes[n].count >= kLeastRecords && marks_.has(hashOfNode(points.keys[n], points.instances[n])))
                 states_[n] = kHeld;
@@ -174,7 +175,9 @@ std::span<const uint32_t> HiddenNodes::rest(Frame& frame, bool areDiscs) {
             if (!isHidden(false)) continue;
             // What a record stands for is within its error of its disc, and reaches no farther than a disc.
             bounds.radius = 2 * bounds.radius + bounds.error / std::min(frame.constants.supportScale, 1.0f);
-            behind_[n] = isHidden(true) ? kWholeBehind : kBehind;
+            // (The means of wide discs, which make fronts smooth, are also of discs behind.)
+            const bool isInMeans = frame.hasSmooth && (points.nodes[n].octantMask & shared::kNodeSmooth) != 0;
+            behind_[n] = !isInMeans && isHidden(true) ? kWholeBehind : kBehind;
         }
     });
     uint64_t all = 0, behind = 0;

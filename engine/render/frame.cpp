@@ -384,12 +384,9 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     const double start = nowSeconds();
     state.streamer->collect();
     state.streamer->upload();
-    state.unrefined.beginView(view);
-    FrameSettings asked = settings;
-    asked.tellsHiddenNodes = !state.unrefined.nodes().empty();  // so that what is left coarse is looked at
-    STIPPLE_TRY(draw(state, view, asked, start, true));
-    learnHidden(state, settings);
-    return {};
+    state.unrefined.clear();  // it is known of one view, and nobody waits for pictures that look again
+    state.counters.nodesLeftCoarse = state.counters.nodesSeenCoarse = 0;
+    return draw(state, view, settings, start, true);
 }
 
 Result<void> renderResident(FrameState& state, const lod::View& view, const FrameSettings& settings) {

@@ -41,6 +41,10 @@ void addErrors(std::span<const lod::Hierarchy* const> hierarchies, std::span<con
             continue;
         }
         const lod::Node& node = h.nodes[points.keys[n].chunk];
+        if (std::max<uint32_t>(node.errorCode, node.sourceCode) >= lod::ErrorScale::kLargest) {
+            error = std::numeric_limits<float>::infinity();  // the last code stands for whatever is larger
+            continue;
+        }
         const double own = std::max(h.errors.decode(node.errorCode), h.errors.decode(node.sourceCode));
         error = static_cast<float>(1.001 * (own * h.unit * instance.scale + instance.inputError + instance.sway));
     }

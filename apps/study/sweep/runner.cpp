@@ -158,6 +158,7 @@ Result<void> measureErrorsOfAll(Run& run) {
         if (of != cell.scene) {
             of = cell.scene;
             full.reset();
+            run.full.reset();
             full = fullDetailOf(run, of);
             oracle = std::make_unique<SceneDrawer>(run.scenes[of], reference::makeReferenceBackend(run.host.executor),
                                                    run.host.executor, result.settings.residentBytes);
