@@ -355,7 +355,9 @@ TEST(BuildPatches, OfTheHelmetStayAsNearAsTheirSamplesAllow) {
     const auto j = nlohmann::json::parse(told.out);
     EXPECT_LE(j["leaf_distance"]["greatest"].get<double>(), 0.033) << "0.0404 with one step of the bound";
     EXPECT_LE(j["patches"]["samples"].get<uint64_t>(), 4u * 22'094u);
-    EXPECT_TRUE(j["maps"].is_null());
+    EXPECT_EQ(j["maps"]["texels"].dump(), R"({"1":1})") << "the light of its visor alone, of each sample";
+    EXPECT_TRUE(j["maps"]["has_light"].get<bool>());
+    EXPECT_FALSE(j["maps"]["has_normals"].get<bool>());
     EXPECT_TRUE(j["coordinate_rounding"].is_null()) << "a distance of surfaces is no rounding";
     EXPECT_EQ(j["levels"].back()["largest_error"], j["leaf_distance"]["greatest"]);
 }
