@@ -106,7 +106,7 @@ TEST(PackTexel, KeepsEveryFieldWithinItsStatedError) {
 }
 
 shared::Texel plainTexel(float depth, float radius) {
-    shared::Texel t;
+    shared::Texel t{};
     t.depth = depth;
     t.radius = radius;
     t.thickness = radius * 0.25f;
