@@ -208,7 +208,7 @@ template <bool isPerspective, bool hasLeaves>
 #pragma GCC ivdep
         for (size_t i = first; i < last; ++i) {
             const float radius = t.radius[i];
-            isMet[i] = radius >= 0.0f ? o.isOn[i] : 0.0f;
+            isMet[i] = radius < 0.0f ? 0.0f : o.isOn[i];  // what is no number takes one lookup
             t.isWide[i] = radius > 0.0f ? o.isOn[i] : 0.0f;
             t.x[i] = t.firstX[i];
             t.y[i] = t.firstY[i];

@@ -11,7 +11,7 @@
 #include "lod/primitives/patch_map.h"
 #include "lod/primitives/patch_samples.h"
 #include "lod/store/materials.h"
-#include "tests/support/backends_here.h"
+#include "tests/support/against_oracle.h"
 #include "tests/support/glass.h"
 #include "tests/support/meshes.h"
 #include "tests/support/patch_scene.h"
@@ -46,25 +46,14 @@ lod::Patch shining(uint32_t density, bool hasLight = true) {
     return p;
 }
 
-class PatchLight : public test::BackendsHere {
+class PatchLight : public test::AgainstOracle {
   protected:
-    void SetUp() override {
-        BackendsHere::SetUp();
-        backends_.erase("fp64");  // the oracle itself
-    }
-    std::unique_ptr<render::Backend> oracle_ = reference::makeReferenceBackend(*executor_);
-
     static render::DrawSettings settings(uint32_t as = shared::kPatchStrips) {
         render::DrawSettings s;
         s.patchAs = as;
         s.lit = true;
         s.worldUp = {0, 1, 0};
         return s;
-    }
-    static double likeness(const render::Image& a, const render::Image& b) {
-        const auto d = reference::compareImages(a, b, 4, nullptr);
-        EXPECT_TRUE(d);
-        return d ? d->psnr : 0;
     }
 };
 

@@ -7,7 +7,7 @@
 #include "engine/reference/reference.h"
 #include "lod/primitives/patch_map.h"
 #include "lod/primitives/patch_samples.h"
-#include "tests/support/backends_here.h"
+#include "tests/support/against_oracle.h"
 #include "tests/support/glass.h"
 #include "tests/support/patch_scene.h"
 #include "tests/support/patch_shapes.h"
@@ -33,14 +33,8 @@ lod::Patch detailed(uint32_t density) {
     return p;
 }
 
-class PatchMapImages : public test::BackendsHere {
+class PatchMapImages : public test::AgainstOracle {
   protected:
-    void SetUp() override {
-        BackendsHere::SetUp();
-        backends_.erase("fp64");  // the oracle itself
-    }
-    std::unique_ptr<render::Backend> oracle_ = reference::makeReferenceBackend(*executor_);
-
     static render::DrawSettings settings(uint32_t as, bool isLit = true) {
         render::DrawSettings s;
         s.patchAs = as;
@@ -48,11 +42,6 @@ class PatchMapImages : public test::BackendsHere {
         s.unlitTriangles = !isLit;
         s.worldUp = {0, 1, 0};
         return s;
-    }
-    static double likeness(const render::Image& a, const render::Image& b) {
-        const auto d = reference::compareImages(a, b, 4, nullptr);
-        EXPECT_TRUE(d);
-        return d ? d->psnr : 0;
     }
 };
 

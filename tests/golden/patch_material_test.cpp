@@ -7,7 +7,7 @@
 #include "engine/reference/reference.h"
 #include "lod/primitives/patch_samples.h"
 #include "lod/store/materials.h"
-#include "tests/support/backends_here.h"
+#include "tests/support/against_oracle.h"
 #include "tests/support/glass.h"
 #include "tests/support/patch_scene.h"
 
@@ -26,13 +26,8 @@ lod::Patch banded() {
     return p;
 }
 
-class PatchMaterials : public test::BackendsHere {
+class PatchMaterials : public test::AgainstOracle {
   protected:
-    void SetUp() override {
-        BackendsHere::SetUp();
-        backends_.erase("fp64");  // the oracle itself
-    }
-    std::unique_ptr<render::Backend> oracle_ = reference::makeReferenceBackend(*executor_);
     std::shared_ptr<const render::Environment> light_ = std::make_shared<const render::Environment>(
         render::makeEnvironment(test::directionLight(512), 1, *executor_, true));
 
@@ -43,11 +38,6 @@ class PatchMaterials : public test::BackendsHere {
         s.worldUp = {0, 1, 0};
         s.environment = light_;
         return s;
-    }
-    static double likeness(const render::Image& a, const render::Image& b) {
-        const auto d = reference::compareImages(a, b, 4, nullptr);
-        EXPECT_TRUE(d);
-        return d ? d->psnr : 0;
     }
 };
 

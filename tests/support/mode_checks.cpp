@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <utility>
+#include <vector>
 
 #include "engine/cpu/cpu_backend.h"
 #include "tests/support/drawn_discs.h"
@@ -28,6 +28,7 @@ std::vector<size_t> pixelsInside(Shape shape, const lod::View& view) {
     return out;
 }
 
+/// Pieces from the last to the first, and of tasks what was started last ends first.
 class BackwardsExecutor final : public Executor {
   public:
     void parallelFor(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) override {
@@ -38,15 +39,15 @@ class BackwardsExecutor final : public Executor {
     void run(std::function<void()> task) override { tasks_.push_back(std::move(task)); }
     void wait() override {
         while (!tasks_.empty()) {
-            const auto task = std::move(tasks_.front());
-            tasks_.pop_front();
+            const auto task = std::move(tasks_.back());
+            tasks_.pop_back();
             task();
         }
     }
     int threads() const override { return 4; }
 
   private:
-    std::deque<std::function<void()>> tasks_;
+    std::vector<std::function<void()>> tasks_;
 };
 
 }  // namespace

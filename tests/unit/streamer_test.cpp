@@ -8,6 +8,7 @@
 
 #include "lod/primitives/kinds.h"
 #include "streaming/streamer.h"
+#include "tests/support/mode_checks.h"
 #include "tests/support/support.h"
 
 namespace stipple::streaming {
@@ -49,24 +50,6 @@ class BrokenSource final : public ByteSource {
 
   private:
     std::string path_ = "cable";
-};
-
-/// What was started last ends first.
-class Backwards final : public Executor {
-  public:
-    void parallelFor(size_t count, size_t, const std::function<void(size_t, size_t)>& body) override { body(0, count); }
-    void run(std::function<void()> task) override { tasks_.push_back(std::move(task)); }
-    void wait() override {
-        while (!tasks_.empty()) {
-            const auto task = std::move(tasks_.back());
-            tasks_.pop_back();
-            task();
-        }
-    }
-    int threads() const override { return 1; }
-
-  private:
-    std::vector<std::function<void()>> tasks_;
 };
 
 class StreamerTest : public testing::Test {
@@ -206,7 +189,7 @@ TEST_F(StreamerTest, WhatWasUsedLeastRecentlyGoesFirst) {
 /// Chunks arrive in any order; where there is room for some of them alone, it is not taken by those that nothing can be
 /// drawn of yet.
 TEST_F(StreamerTest, NothingIsUploadedBeforeWhatItBuildsOn) {
-    executor_ = std::make_unique<Backwards>();
+    executor_ = test::makeBackwardsExecutor();
     CountingSink sink;
     Streamer streamer(*executor_, sink, {200'000, 1u << 26, 64});
     const lod::Hierarchy& h = store_->hierarchy;
