@@ -33,16 +33,23 @@ struct HorizonSearch {
     }
 };
 
+/// Where nothing is seen nothing is hidden.
+[[gnu::always_inline]] inline bool isEmptyRun(const float* __restrict depth, uint32_t n) {
+    float most = 0.0f;
+    for (size_t i = 0; i < n; ++i) most = max(most, depth[i]);
+    return !(most > 0.0f);
+}
+
 void occludeRow(const FrameConstants& frame, const AoPlanes& of, uint32_t x0, uint32_t y, uint32_t n) {
     const FrameConstants f = frame;
     const size_t first = of.at(x0, y);
     float* const __restrict out = of.open + first;
     const float* const __restrict depth = of.depth + first;
     const uint32_t* const __restrict normal = of.normal + first;
-    // Where nothing is seen nothing is hidden.
-    const uint32_t groups = groupsHeld(n, depth);
-    for (size_t i = 0; i < n; ++i) out[i] = 1.0f;
-    if (groups == 0u) return;
+    if (isEmptyRun(depth, n)) {
+        for (size_t i = 0; i < n; ++i) out[i] = 1.0f;
+        return;
+    }
     alignas(64) float cosine[kTile], sine[kTile], start[kTile];
     for (uint32_t i = 0; i < n; ++i) {
         const uint32_t number = aoNumber((x0 + i) & 3u, y & 3u);
@@ -63,20 +70,18 @@ void occludeRow(const FrameConstants& frame, const AoPlanes& of, uint32_t x0, ui
                                int(of.height) - 1,
                                int(of.pitch)};
     const float py = row * edge + 0.5f - f.centre.y;
-    forGroups(groups, n, [&](size_t begin, size_t end) __attribute__((always_inline)) {
 #pragma GCC ivdep
-        for (size_t i = begin; i < end; ++i) {
-            const float x = left + float(int(i)), z = depth[i];
-            const AoPlace a =
-                aoPlace(lens, x * edge + 0.5f - f.centre.x, py, z > 0.0f ? z : 1.0f, octDecode(normal[i]), radius);
-            const float c = cosine[i], s = sine[i];
-            const AoSide along = aoSide(a, c, s), aside = aoSide(a, -s, c);
-            const float hidden =
-                search(a, along, x, row, c, s, start[i]) + search(a, aoBack(along), x, row, -c, -s, start[i]) +
-                search(a, aside, x, row, -s, c, start[i]) + search(a, aoBack(aside), x, row, s, -c, start[i]);
-            out[i] = z > 0.0f ? 1.0f - 0.5f * a.share * hidden : 1.0f;
-        }
-    });
+    for (size_t i = 0; i < n; ++i) {
+        const float x = left + float(int(i)), z = depth[i];
+        const AoPlace a =
+            aoPlace(lens, x * edge + 0.5f - f.centre.x, py, z > 0.0f ? z : 1.0f, octDecode(normal[i]), radius);
+        const float c = cosine[i], s = sine[i];
+        const AoSide along = aoSide(a, c, s), aside = aoSide(a, -s, c);
+        const float hidden =
+            search(a, along, x, row, c, s, start[i]) + search(a, aoBack(along), x, row, -c, -s, start[i]) +
+            search(a, aside, x, row, -s, c, start[i]) + search(a, aoBack(aside), x, row, s, -c, start[i]);
+        out[i] = z > 0.0f ? 1.0f - 0.5f * a.share * hidden : 1.0f;
+    }
 }
 
 /// A sum of what is of one surface.
@@ -94,13 +99,13 @@ template <bool isDown>
 [[gnu::always_inline]] inline void aoMeanAlong(const FrameConstants& f, const AoPlanes& of,
                                                const float* __restrict depth, const uint32_t* __restrict normal,
                                                const float* __restrict from, float* __restrict to, uint32_t x0,
-                                               uint32_t y, size_t begin, size_t end) {
+                                               uint32_t y, uint32_t n) {
     const Lens lens = lensHere(f.focal);
     const float edge = float(int(of.edge)), radius = of.radius, centreX = f.centre.x;
     const float py = float(int(y)) * edge + 0.5f - f.centre.y, left = float(int(x0));
     const ptrdiff_t pace = isDown ? ptrdiff_t{of.pitch} : 1;
 #pragma GCC ivdep
-    for (size_t i = begin; i < end; ++i) {
+    for (size_t i = 0; i < n; ++i) {
         const float z = depth[i], px = (left + float(int(i))) * edge + 0.5f - centreX;
         const vec2 slopes = aoSlope(lens, px, py, octDecode(normal[i]));
         const float slope = (isDown ? slopes.y : slopes.x) * edge;
@@ -124,14 +129,14 @@ void aoMeanRow(const FrameConstants& frame, const AoPlanes& of, bool isDown, uin
     const float* const depth = of.depth + first;
     const float* const from = (isDown ? of.mean : of.open) + first;
     float* const to = (isDown ? of.open : of.mean) + first;
-    for (size_t i = 0; i < n; ++i) to[i] = 1.0f;
-    const uint32_t* const normal = of.normal + first;
-    forGroups(groupsHeld(n, depth), n, [&](size_t begin, size_t end) __attribute__((always_inline)) {
-        if (isDown)
-            aoMeanAlong<true>(f, of, depth, normal, from, to, x0, y, begin, end);
-        else
-            aoMeanAlong<false>(f, of, depth, normal, from, to, x0, y, begin, end);
-    });
+    if (isEmptyRun(depth, n)) {
+        for (size_t i = 0; i < n; ++i) to[i] = 1.0f;
+        return;
+    }
+    if (isDown)
+        aoMeanAlong<true>(f, of, depth, of.normal + first, from, to, x0, y, n);
+    else
+        aoMeanAlong<false>(f, of, depth, of.normal + first, from, to, x0, y, n);
 }
 
 /// Pixels of one row of the picture that are `edge` apart, from (x0, y) on.
