@@ -110,7 +110,7 @@ template <bool besideToo, bool wideToo>
                 max(min(edge * radiusFractionFast(recordRadiusCode(r)), lensDepth(lens, cz) * cap) * scale, minimum);
             const vec3 sight = sightTo(lens, vec3(cx, cy, cz));
             const SplatPixel s = splatPixel(px, py, sight.x, sight.y, sight.z, radius, width, height);
-            inside = (cz > nearPlane) & (s.x >= 0);
+            inside = (cz > nearPlane) & (s.share < 1.0f);  // (as s.x >= 0, of which GCC makes a choice between bools)
             atX = float(s.x);
             atY = float(s.y);
             key = cz + s.farther * radius / scale;

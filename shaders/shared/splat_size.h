@@ -22,6 +22,7 @@ const float kOffsetRadii = 16.0f;  // offsets are kept up to that many radii
 struct SplatPixel {
     int x;
     int y;
+    float share;
     float farther;
 };
 SHARED_FN SplatPixel splatPixel(float px, float py, float cx, float cy, float cz, float radius, float width,
@@ -38,6 +39,7 @@ SHARED_FN SplatPixel splatPixel(float px, float py, float cx, float cy, float cz
     SplatPixel s;
     s.x = isNear ? int(x) : -1;
     s.y = isNear ? int(y) : -1;
+    s.share = share;
     s.farther = isNear ? share : 0.0f;
     return s;
 }
