@@ -9,9 +9,8 @@ struct Gathered {
     alignas(64) float turned[kTile], nx[kTile], ny[kTile], nz[kTile];
     alignas(64) float front[kTile];  // depth by which each was the nearest
     alignas(64) uint8_t smooth[kTile];
-    // Where records have been read, and of what node; null: no point is shown.
-    const PointRecord* record[kTile];
-    const DrawNode* node[kTile];
+    alignas(64) uint32_t positionXY[kTile], positionZ[kTile];  // of the records, which are read once
+    const DrawNode* node[kTile];                               // null: no point is shown
 };
 
 /// What the points of a row are: flags and masks of all of them.
@@ -145,7 +144,7 @@ struct OtherPixels {
 
 /// Pixels that show no point.
 void gatherNothing(uint32_t n, Gathered& g) {
-    for (size_t i = 0; i < n; ++i) g.record[i] = nullptr;
+    for (size_t i = 0; i < n; ++i) g.node[i] = nullptr;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         g.front[i] = 0;
@@ -158,13 +157,15 @@ void gatherNothing(uint32_t n, Gathered& g) {
     for (size_t i = 0; i < n; ++i) g.smooth[i] = 0;
 }
 
-/// All of a point but its place (and of turned nodes its normal).
+/// All of a point but where its place is in camera space (and of turned nodes its normal).
 [[gnu::always_inline]] inline void gatherPoint(const FrameConstants& f, const Tables& tables, const BlockSource& block,
                                                uint64_t key, Gathered& g, size_t i, GatheredKinds& kinds) {
     const PointRecord* const r = block.records + keyLane(key);
     const DrawNode& node = *block.node;
-    g.record[i] = r;
     g.node[i] = &node;
+    g.positionXY[i] = r->positionXY;
+    g.positionZ[i] = r->positionZRadiusError;
+    g.radius[i] = node.edge * tables.radiusFraction[recordRadiusCode(*r)];
     g.normal[i] = r->normal;
     g.flags[i] = recordFlags(*r);
     if (f.hasMaterials != 0u) g.material[i] = block.materialOf(keyLane(key));
@@ -183,23 +184,52 @@ void gatherNothing(uint32_t n, Gathered& g) {
     }
 }
 
-/// Places and radii of the points of a row.
-void gatherPlaces(const Tables& tables, uint32_t n, Gathered& g) {
-    for (size_t i = 0; i < n; ++i) {
-        if (g.record[i] == nullptr) {
-            g.x[i] = 0;
-            g.y[i] = 0;
-            g.z[i] = -1;
-            g.radius[i] = 0;
+/// Place of a record of that node in camera space.
+[[gnu::always_inline]] inline vec3 placeInNode(const DrawNode& node, uint32_t positionXY, uint32_t positionZ) {
+    const PointRecord r{positionXY, positionZ, 0u, 0u};
+    const float qx = float(int(recordX(r))), qy = float(int(recordY(r))), qz = float(int(recordZ(r)));
+    return vec3(node.base.x + node.axisX.x * qx + node.axisY.x * qy + node.axisZ.x * qz,
+                node.base.y + node.axisX.y * qx + node.axisY.y * qy + node.axisZ.y * qz,
+                node.base.z + node.axisX.z * qx + node.axisY.z * qy + node.axisZ.z * qz);
+}
+/// The same of points [first, last), all of one node.
+[[gnu::always_inline]] inline void placesInNode(const DrawNode& drawNode, size_t first, size_t last,
+                                                Gathered& __restrict g) {
+    const DrawNode node = drawNode;
+#pragma GCC ivdep
+    for (size_t i = first; i < last; ++i) {
+        const vec3 place = placeInNode(node, g.positionXY[i], g.positionZ[i]);
+        const bool isThere = g.front[i] > 0.0f;
+        g.x[i] = isThere ? place.x : 0.0f;
+        g.y[i] = isThere ? place.y : 0.0f;
+        g.z[i] = isThere ? place.z : -1.0f;
+        g.radius[i] = isThere ? g.radius[i] : 0.0f;
+    }
+}
+/// Places of the points of a row. Those side by side are mostly of one node.
+void gatherPlaces(uint32_t n, Gathered& g) {
+    for (size_t first = 0; first < n; first += kTexelGroup) {
+        const size_t last = first + kTexelGroup < n ? first + kTexelGroup : n;
+        const DrawNode* node = nullptr;
+        bool isOne = true;
+        for (size_t i = first; i < last; ++i) {
+            const DrawNode* const here = g.node[i];
+            node = node == nullptr ? here : node;
+            isOne = isOne && (here == nullptr || here == node);
+        }
+        if (node != nullptr && isOne) {
+            placesInNode(*node, first, last, g);
             continue;
         }
-        const PointRecord r = *g.record[i];
-        const DrawNode& node = *g.node[i];
-        const float qx = float(int(recordX(r))), qy = float(int(recordY(r))), qz = float(int(recordZ(r)));
-        g.x[i] = node.base.x + node.axisX.x * qx + node.axisY.x * qy + node.axisZ.x * qz;
-        g.y[i] = node.base.y + node.axisX.y * qx + node.axisY.y * qy + node.axisZ.y * qz;
-        g.z[i] = node.base.z + node.axisX.z * qx + node.axisY.z * qy + node.axisZ.z * qz;
-        g.radius[i] = node.edge * tables.radiusFraction[recordRadiusCode(r)];
+        for (size_t i = first; i < last; ++i) {
+            const bool isThere = g.node[i] != nullptr;
+            const vec3 place =
+                isThere ? placeInNode(*g.node[i], g.positionXY[i], g.positionZ[i]) : vec3(0.0f, 0.0f, -1.0f);
+            g.x[i] = place.x;
+            g.y[i] = place.y;
+            g.z[i] = place.z;
+            if (!isThere) g.radius[i] = 0;
+        }
     }
 }
 
@@ -255,7 +285,7 @@ void turnNormals(uint32_t n, Gathered& g) {
     const vec3 d = octDecode(shown.normal);
     kinds.any = true;
     kinds.octantMasks |= kNodeTurned;
-    g.record[i] = nullptr;
+    g.node[i] = nullptr;
     g.smooth[i] = 0;
     g.front[i] = keyDepth(key);
     g.turned[i] = 1;
@@ -272,34 +302,40 @@ void turnNormals(uint32_t n, Gathered& g) {
 void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const FilteredPixel* filtered,
                const SecondPixels& seconds, uint64_t* visibility, uint32_t n, Gathered& g, OtherPixels& others,
                GatheredKinds& kinds) {
-    constexpr uint32_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     const BlockRanges firstBlock = f.firstBlock;
     for (WinningPixels& p : others.of) p.count = 0;
     gatherNothing(n, g);
     // The pixels that show something, closed up without branches.
     alignas(64) uint32_t seen[kTile + 1];
+    uint64_t keys[kTile];
+    const BlockSource* of[kTile];  // null: no record
     uint32_t count = 0;
     const bool hasSeconds = seconds.list != nullptr;
     for (uint32_t i = 0; i < n; ++i) {
         seen[count] = i;
         count += (visibility[i] != kNoKey) | (hasSeconds && seconds.kinds[i] == kSecondFront) ? 1u : 0u;
     }
+    // Records lie anywhere in memory: all of the row are asked for before the first is read.
     for (uint32_t k = 0; k < count; ++k) {
-        if (filtered == nullptr && k + kPrefetch < count) {
-            const uint64_t ahead = visibility[seen[k + kPrefetch]];
-            if (isPointKey(ahead, firstBlock)) __builtin_prefetch(blocks[keyBlock(ahead)].records + keyLane(ahead));
-        }
         const uint32_t i = seen[k];
-        uint64_t key = visibility[i];
+        const bool isSecond = hasSeconds && seconds.kinds[i] == kSecondFront;
+        const uint64_t key = isSecond ? seconds.at(i)->key : visibility[i];
         visibility[i] = kNoKey;
-        if (hasSeconds && seconds.kinds[i] == kSecondFront) key = seconds.at(i)->key;
-        if (!isPointKey(key, firstBlock)) {
-            if (key != kNoKey) gatherOther(key, firstBlock, i, others);
-        } else if (filtered != nullptr) {
+        keys[k] = key;
+        const BlockSource* const block =
+            filtered == nullptr && isPointKey(key, firstBlock) ? blocks + keyBlock(key) : nullptr;
+        of[k] = block;
+        if (block != nullptr) __builtin_prefetch(block->records + keyLane(key));
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        const uint32_t i = seen[k];
+        const uint64_t key = keys[k];
+        if (of[k] != nullptr)
+            gatherPoint(f, tables, *of[k], key, g, i, kinds);
+        else if (isPointKey(key, firstBlock))
             gatherBlended(filtered[i], key, g, i, kinds);
-        } else {
-            gatherPoint(f, tables, blocks[keyBlock(key)], key, g, i, kinds);
-        }
+        else if (key != kNoKey)
+            gatherOther(key, firstBlock, i, others);
     }
 }
 
@@ -354,7 +390,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     const bool needsPlaces = filtered == nullptr && (!in.exactPoints || in.needsDepths ||
                                                      (kinds.flags & kFlagNoNormal) != 0u ||
                                                      (kinds.octantMasks & kNodeSmooth) != 0u);
-    if (needsPlaces) gatherPlaces(tables, n, g);
+    if (needsPlaces) gatherPlaces(n, g);
     if (filtered == nullptr && kinds.isTurned()) turnNormals(n, g);
     if (kinds.isTurned())
         resolvePoints<true>(f, in, g, needsPlaces, x0, y, n, row);
