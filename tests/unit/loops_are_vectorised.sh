@@ -36,30 +36,37 @@ printf '%s\n' "${words[@]}" | grep -qx -- '-O3' || skip "no optimised build"
 
 mkdir -p "$folder/engine" && cp -r "$source/engine/cpu" "$folder/engine/cpu" || exit 2
 if [ "$3" = --self-test ]; then
-    # A branch that the compiler cannot turn into a selection: a store to what it knows nothing of.
+    # A branch that the compiler cannot turn into a selection: a store to what it knows nothing of. And one in a single
+    # instance of a template.
+    sed -i 's/^        if (wideToo) {/        if (wideToo \&\& cz > 7.0f) __asm__ volatile("");\n&/' "$folder/engine/cpu/kernels.inl"
     awk '{ print } /^#pragma GCC ivdep/ && !done { getline; print; print "if (b.isNear[l] > 7.0f) __asm__ volatile(\"\");"; done = 1 }' \
         "$source/engine/cpu/splat.inl" >"$folder/engine/cpu/splat.inl"
 fi
 "${words[@]}" -I"$source" -iquote "$folder" -c "$folder/$kernel" -o "$folder/kernels.o" \
-    -fopt-info-loop-vec-optimized="$folder/report" || exit 1
+    -fopt-info-loop-vec-optimized-missed="$folder/report" || exit 1
 
-# Of what this one reads (tables by level, wrapping by material) GCC makes control flow; to be mended, and nothing added.
-known=' engine/cpu/sample.inl:32 '
-status=0 loops=0
+# Of what these read (tables by level, wrapping by material; two triangles of a cell; second surfaces) GCC makes control
+# flow, in some of their instances or all; to be mended, and nothing added.
+known=' engine/cpu/sample.inl:32 engine/cpu/patch_splats.inl:21 engine/cpu/ewa_fronts.inl:29 '
+status=0 loops=0 spoilt=
 while IFS=: read -r file line _; do
     # (Copies and fills become calls of the library.) The loop begins in one of the lines below the pragma that speaks of it.
     at=$((line + 1))
     loops=$((loops + 1))
-    grep -qE "/${file##*/}:$at:[0-9]+: optimized: +(loop vectorized|Loop [0-9]+ distributed: split to 0 loops and [1-9])" "$folder/report" && continue
     case $known in *" $file:$at "*) continue ;; esac
-    echo "$file:$at: not vectorised: $(sed -n "${at}p" "$folder/$file")"
+    # A template's loop is one for each of its instances, and of them all.
+    few=$(grep -cE "/${file##*/}:$at:[0-9]+: missed: +couldn't vectorize loop" "$folder/report")
+    grep -qE "/${file##*/}:$at:[0-9]+: optimized: +(loop vectorized|Loop [0-9]+ distributed: split to 0 loops and [1-9])" "$folder/report" &&
+        [ "$few" -eq 0 ] && continue
+    echo "$file:$at: not vectorised (instances: $few): $(sed -n "${at}p" "$folder/$file")"
     status=1
+    spoilt+=" $(basename "$file" .inl)"
 done < <(cd "$folder" && grep -n '^ *#pragma GCC ivdep' engine/cpu/*.inl | tr -d ' ')
 echo "$loops loops"
 [ "$loops" -gt 50 ] || { echo "they are not found"; status=1; }
 if [ "$3" = --self-test ]; then
-    [ "$status" -ne 0 ] && exit 0
-    echo "a spoilt loop was not found"
+    [ "$spoilt" = ' splat kernels' ] || [ "$spoilt" = ' kernels splat' ] && exit 0
+    echo "of the spoilt loops of splat.inl and kernels.inl only these were found:$spoilt"
     exit 1
 fi
 exit $status
