@@ -34,17 +34,21 @@ class HugeBuffer {
     std::unique_ptr<T, Free> data_;
 };
 
-/// Resizes what is handed over as a vector; where it has to grow, into huge pages as far as they fit into it.
+/// Room for `count` in a vector, which is emptied if it has to grow, on huge pages as far as they fit into it.
+template <typename T>
+void reserveHuge(std::vector<T>& of, size_t count) {
+    constexpr uintptr_t kHuge = uintptr_t{2} << 20;
+    if (count <= of.capacity()) return;
+    of = {};
+    of.reserve(count);
+    const auto first = reinterpret_cast<uintptr_t>(of.data());
+    const uintptr_t begin = (first + kHuge - 1) / kHuge * kHuge, end = (first + count * sizeof(T)) / kHuge * kHuge;
+    if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+}
+/// Resizes what is handed over as a vector in that way.
 template <typename T>
 void resizeHuge(std::vector<T>& of, size_t count) {
-    constexpr uintptr_t kHuge = uintptr_t{2} << 20;
-    if (count > of.capacity()) {
-        of = {};
-        of.reserve(count);
-        const auto first = reinterpret_cast<uintptr_t>(of.data());
-        const uintptr_t begin = (first + kHuge - 1) / kHuge * kHuge, end = (first + count * sizeof(T)) / kHuge * kHuge;
-        if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
-    }
+    reserveHuge(of, count);
     of.resize(count);
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/huge_buffer.h"
 #include "engine/base/result.h"
 
 namespace stipple {
@@ -15,9 +16,9 @@ class Spill {
   public:
     /// `path` empty: in memory. A file that is there already stays what it is (see restore).
     explicit Spill(std::string path) : path_(std::move(path)) {}
-    /// In memory: room for that many bytes.
+    /// In memory: room for that many bytes. Before anything is appended.
     void reserve(uint64_t bytes) {
-        if (path_.empty()) memory_.reserve(bytes);
+        if (path_.empty() && memory_.empty()) reserveHuge(memory_, bytes);
     }
     /// From several threads; what one call brings stays together.
     Result<void> append(const std::vector<uint8_t>& bytes);

@@ -56,7 +56,18 @@ void Pyramid::pull() {
 
 bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n,
                       TexelRow& row) const {
-    return loadTexels(planes.at(size_t{y} * level.width + x), level.held(y, x, n), kPad, n, row);
+    const size_t at = size_t{y} * level.width + x;
+    const uint32_t held = level.held(y, x, n);
+    // (The next row of a tile is a level's width away, where no processor looks by itself.)
+    if (held != 0 && y + 1 < level.height) {
+        const Planes next = planes.at(at + level.width);
+        for (uint32_t i = 0; i < n; i += kTexelGroup) {
+            __builtin_prefetch(next.depth + i);
+            for (const uint32_t* plane : {next.size, next.offset, next.normal, next.colour})
+                __builtin_prefetch(plane + i);
+        }
+    }
+    return loadTexels(planes.at(at), held, kPad, n, row);
 }
 
 bool Pyramid::loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, TexelRow& row) const {

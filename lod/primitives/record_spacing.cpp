@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace stipple::lod {
 namespace {
@@ -11,27 +12,52 @@ namespace {
 constexpr size_t kNeighbours = 6;
 constexpr size_t kProbes = 24;  // their median is within a tenth of that of all
 constexpr float kPi = 3.14159265f;
+constexpr size_t kLanesOfSpacing = 16;
+constexpr float kRoundedUp = 1 + 1e-6f;  // more than three products and two sums of floats may be off
 
 }  // namespace
 
 float recordSpacing(std::span<const shared::PointRecord> records) {
     const size_t n = records.size();
     if (n <= kNeighbours) return 0;
+    // Coordinates side by side, as floats, which say by SIMD what is too far away; whole numbers say the rest. (Those
+    // behind the last are too far from anything.)
+    thread_local std::vector<float> xs, ys, zs;
+    const size_t padded = (n + kLanesOfSpacing - 1) / kLanesOfSpacing * kLanesOfSpacing;
+    for (auto* column : {&xs, &ys, &zs}) column->assign(padded, 1e9f);
+    for (size_t k = 0; k < n; ++k) {
+        xs[k] = static_cast<float>(shared::recordX(records[k]));
+        ys[k] = static_cast<float>(shared::recordY(records[k]));
+        zs[k] = static_cast<float>(shared::recordZ(records[k]));
+    }
     const size_t probes = std::min(kProbes, n);
     std::array<int64_t, kProbes> areas{};
     for (size_t p = 0; p < probes; ++p) {
         const shared::PointRecord& from = records[(p * 2654435761u + 12345u) % n];
         const auto x = int64_t{shared::recordX(from)}, y = int64_t{shared::recordY(from)},
                    z = int64_t{shared::recordZ(from)};
+        const auto fx = static_cast<float>(x), fy = static_cast<float>(y), fz = static_cast<float>(z);
         std::array<int64_t, kNeighbours + 1> nearest{};  // itself comes first
         nearest.fill(std::numeric_limits<int64_t>::max());
-        for (const shared::PointRecord& r : records) {
-            const int64_t dx = shared::recordX(r) - x, dy = shared::recordY(r) - y, dz = shared::recordZ(r) - z;
-            const int64_t squared = dx * dx + dy * dy + dz * dz;
-            if (squared >= nearest.back()) continue;
-            size_t at = kNeighbours;
-            for (; at > 0 && nearest.at(at - 1) > squared; --at) nearest.at(at) = nearest.at(at - 1);
-            nearest.at(at) = squared;
+        float limit = std::numeric_limits<float>::max();
+        for (size_t first = 0; first < n; first += kLanesOfSpacing) {
+            int32_t isNear = 0;
+            for (size_t k = 0; k < kLanesOfSpacing; ++k) {
+                const float dx = xs[first + k] - fx, dy = ys[first + k] - fy, dz = zs[first + k] - fz;
+                const float squared = dx * dx + dy * dy + dz * dz;
+                isNear |= squared <= limit ? 1 : 0;
+            }
+            if (isNear == 0) continue;
+            for (size_t k = first; k < std::min(n, first + kLanesOfSpacing); ++k) {
+                const int64_t dx = shared::recordX(records[k]) - x, dy = shared::recordY(records[k]) - y,
+                              dz = shared::recordZ(records[k]) - z;
+                const int64_t squared = dx * dx + dy * dy + dz * dz;
+                if (squared >= nearest.back()) continue;
+                size_t at = kNeighbours;
+                for (; at > 0 && nearest.at(at - 1) > squared; --at) nearest.at(at) = nearest.at(at - 1);
+                nearest.at(at) = squared;
+            }
+            limit = static_cast<float>(nearest.back()) * kRoundedUp;
         }
         areas.at(p) = nearest.back();
     }

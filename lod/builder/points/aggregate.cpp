@@ -124,9 +124,7 @@ struct Extent {
 /// Axes of a disc's plane.
 struct Plane {
     glm::vec3 n, t1, t2;
-    bool none;
-    explicit Plane(const AggregateRecord& out) : none(!hasNormal(out)) {
-        n = none ? glm::vec3(0, 0, 1) : out.normal;
+    explicit Plane(const AggregateRecord& out) : n(out.normal) {
         t1 = glm::normalize(std::abs(n.x) < 0.7f ? glm::vec3(0, -n.z, n.y) : glm::vec3(-n.z, 0, n.x));
         t2 = glm::cross(n, t1);
     }
@@ -134,9 +132,15 @@ struct Plane {
 
 /// Of the leaves themselves.
 Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const AggregateRecord& out) {
+    if (!hasNormal(out)) {  // a ball has no plane
+        Extent e;
+        for (size_t i = begin; i < end; ++i)
+            e.reach =
+                std::max(e.reach, glm::length(glm::vec3(leaves.points.at(i) - out.place)) + leaves.points.radius[i]);
+        return e;
+    }
     const Plane plane(out);
     const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
-    const bool none = plane.none;
     constexpr size_t kBlock = 64;
     alignas(64) float us[kBlock], vs[kBlock], insides[kBlock];
     alignas(64) std::array<float, kDirections> extent{};
@@ -149,13 +153,12 @@ Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const Aggr
             const size_t i = first + k;
             const glm::vec3 d(leaves.points.at(i) - out.place);
             const float radius = leaves.points.radius[i];
-            const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = none ? 0.0f : glm::dot(d, n);
+            const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = glm::dot(d, n);
             const float along = glm::dot(n, leaves.normalOf(i));
             const float rise = radius * std::sqrt(std::max(0.0f, 1.0f - along * along));
             e.above = std::max(e.above, w + rise);
             e.below = std::max(e.below, rise - w);
-            const float distance = none ? glm::length(d) : std::sqrt(u * u + v * v);
-            e.reach = std::max(e.reach, distance + radius);
+            e.reach = std::max(e.reach, std::sqrt(u * u + v * v) + radius);
             us[k] = u;
             vs[k] = v;
             insides[k] = radius * std::abs(along);
@@ -171,16 +174,22 @@ Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const Aggr
 
 /// Of the leaves of all parts, against the disc's plane through out.place.
 Extent extentOf(std::span<const AggregateRecord> parts, const AggregateRecord& out) {
+    if (!hasNormal(out)) {
+        Extent e;
+        for (const AggregateRecord& p : parts)
+            e.reach =
+                std::max(e.reach, glm::length(glm::vec3(p.place - out.place)) + std::max(p.above, p.below) + p.radius);
+        return e;
+    }
     const Plane plane(out);
     const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
-    const bool none = plane.none;
     alignas(64) std::array<float, kDirections> extent{};
     extent.fill(-1e30f);
     Extent e;
     e.above = e.below = -1e30f;
     for (const AggregateRecord& p : parts) {
         const glm::vec3 d(p.place - out.place);
-        const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = none ? 0.0f : glm::dot(d, n);
+        const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = glm::dot(d, n);
         const float along = hasNormal(p) ? glm::dot(n, p.normal) : 0.0f;
         // A record without a normal is a ball: its rim rises by its whole radius.
         const float sine = std::sqrt(std::max(0.0f, 1.0f - along * along));
@@ -188,8 +197,7 @@ Extent extentOf(std::span<const AggregateRecord> parts, const AggregateRecord& o
         const float rise = p.radius * sine;
         e.above = std::max(e.above, w + rise + std::max(p.above * along, -p.below * along));
         e.below = std::max(e.below, -w + rise + std::max(p.below * along, -p.above * along));
-        const float distance = none ? glm::length(d) + slab : std::sqrt(u * u + v * v) + slab * sine;
-        e.reach = std::max(e.reach, distance + p.radius);
+        e.reach = std::max(e.reach, std::sqrt(u * u + v * v) + slab * sine + p.radius);
         // In any direction of the plane the leaves reach at least that far from the part's centre.
         const float moved = p.count == 1 ? static_cast<float>(glm::length(p.mean - p.place)) : 0.0f;
         const float inside = std::max(p.inner * std::abs(along) - slab * sine - moved, -p.radius);

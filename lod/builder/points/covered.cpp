@@ -384,32 +384,25 @@ Seen seenPart(const Around& around, const DiscPlane& plane, size_t i) {
     return {p.u, p.v, p.core, p.hole};
 }
 
-/// Leaves as balls: of one, or of all below a part, which lie within `reach` of their mean.
-struct Ball {
-    glm::dvec3 mean;
-    double weight, reach, radius;  ///< radius: of the leaves at least, where they are known
+/// Of balls, which are leaves or stand for those below a part, the ones whose means are within a distance of a record.
+struct Balls {
+    double distance = 0;
+    glm::dvec3 sum{0};  ///< of the leaves' means beside the record
+    double weight = 0, least = 1e300;
+    glm::dvec3 off{0};  ///< of their common mean
+    double reach = 0;   ///< of the farthest leaf from that
+    /// How far a place of the record's ball is from the next of the leaves, at most: on its side of their common mean
+    /// there is one.
+    double farthest(double radius) const {
+        return weight == 0 ? 1e300 : std::hypot(radius + glm::length(off), reach) - least;
+    }
 };
-
-/// How far a place of the record's ball is from the next of those leaves whose means are within `distance` of the
-/// record, at most: on its side of their common mean there is one.
-template <typename BallAt>
-double farthestOfBall(const AggregateRecord& record, double distance, size_t count, const BallAt& ballAt) {
-    glm::dvec3 sum(0);
-    double weight = 0, reach = 0, least = 1e300;
-    const auto forThose = [&](const auto& use) {
-        for (size_t i = 0; i < count; ++i)
-            if (const Ball b = ballAt(i); glm::length(b.mean - record.place) <= distance) use(b);
-    };
-    forThose([&](const Ball& b) {
-        sum += b.weight * (b.mean - record.place);
-        weight += b.weight;
-        least = std::min(least, b.radius);
-    });
-    if (weight == 0) return 1e300;
-    const glm::dvec3 off = sum / weight;
-    forThose([&](const Ball& b) { reach = std::max(reach, glm::length(b.mean - record.place - off) + b.reach); });
-    return std::hypot(static_cast<double>(record.radius) + glm::length(off), reach) - least;
-}
+/// `place`: beside the record; `reach`: how far the leaves that it stands for lie from there.
+struct Ball {
+    glm::dvec3 place;
+    double reach;
+    size_t first;  ///< of the sets of balls, of which each holds all of the one before
+};
 
 }  // namespace
 
@@ -434,23 +427,36 @@ uint32_t coveringCode(const AggregateRecord& record, const Around& around, uint3
 double coveringErrorOfBall(const AggregateRecord& record, std::span<const AggregateRecord> parts,
                            const Leaves* leaves) {
     const auto radius = static_cast<double>(record.radius);
+    std::array<Balls, 3> within;
+    for (size_t k = 0; const double share : {0.25, 0.5, 1.0}) within.at(k++).distance = share * radius * (1 + 1e-6);
+    thread_local std::vector<Ball> balls;
+    balls.clear();
+    // `least`: radius of the leaves at least, where they are known.
+    const auto add = [&](const glm::dvec3& mean, double weight, double reach, double least) {
+        const glm::dvec3 place = mean - record.place;
+        const double away = glm::length(place);
+        size_t first = 0;
+        while (first < within.size() && !(away <= within[first].distance)) ++first;
+        for (size_t k = first; k < within.size(); ++k) {
+            within[k].sum += weight * place;
+            within[k].weight += weight;
+            within[k].least = std::min(within[k].least, least);
+        }
+        if (first < within.size()) balls.push_back({place, reach, first});
+    };
+    if (leaves != nullptr)
+        for (size_t at = record.first; at < size_t{record.first} + record.count; ++at)
+            add(leaves->points.at(at), 1, 0, static_cast<double>(leaves->points.radius[at]));
+    else
+        for (const AggregateRecord& p : parts)
+            add(p.mean, p.count, p.count == 1 ? 0.0 : glm::length(p.mean - p.place) + static_cast<double>(p.radius), 0);
+    for (Balls& b : within)
+        if (b.weight > 0) b.off = b.sum / b.weight;
+    for (const Ball& b : balls)
+        for (size_t k = b.first; k < within.size(); ++k)
+            within[k].reach = std::max(within[k].reach, glm::length(b.place - within[k].off) + b.reach);
     double error = 1e300;
-    for (const double share : {0.25, 0.5, 1.0}) {
-        const double distance = share * radius * (1 + 1e-6);
-        const double off =
-            leaves != nullptr ? farthestOfBall(record, distance, record.count,
-                                               [&](size_t i) {
-                                                   const size_t at = record.first + i;
-                                                   const auto own = static_cast<double>(leaves->points.radius[at]);
-                                                   return Ball{leaves->points.at(at), 1, 0, own};
-                                               })
-                              : farthestOfBall(record, distance, parts.size(), [&](size_t i) {
-                                    const AggregateRecord& p = parts[i];
-                                    const double around = glm::length(p.mean - p.place) + static_cast<double>(p.radius);
-                                    return Ball{p.mean, static_cast<double>(p.count), p.count == 1 ? 0.0 : around, 0};
-                                });
-        error = std::min(error, off);
-    }
+    for (const Balls& b : within) error = std::min(error, b.farthest(radius));
     return std::max(error, radius);
 }
 

@@ -394,7 +394,8 @@ bool isCoarse(const Frame& frame, const SortedPoints& from, size_t begin, size_t
     Place before{};
     for (size_t i = begin; i < end; ++i) {
         const Place place = from.points.place(i);
-        if (i > begin && place == before) continue;
+        // (Their == is a call.)
+        if (i > begin && place[0] == before[0] && place[1] == before[1] && place[2] == before[2]) continue;
         ++different;
         for (size_t k = 0; k < places.size(); ++k) {
             const uint32_t shift = frame.shiftOf(std::min(level + kMostBelow.at(k).first, frame.keyLevels));

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include "engine/base/huge_buffer.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -30,7 +32,8 @@ void radixSort(std::vector<Keyed<K>>& items) {
     }
     const unsigned bits = bitWidth(any ^ all);
     if (items.empty() || bits == 0) return;
-    std::vector<Keyed<K>> other(items.size());
+    std::vector<Keyed<K>> other;
+    resizeHuge(other, items.size());
     std::vector<uint32_t> counts(kDigits);
     for (unsigned shift = 0; shift < bits; shift += kDigitBits) {
         std::fill(counts.begin(), counts.end(), 0);
@@ -44,7 +47,8 @@ void radixSort(std::vector<Keyed<K>>& items) {
 
 template <typename K, typename PlaceOf>
 std::vector<Keyed<K>> inOrder(const Frame& frame, size_t count, const PlaceOf& placeOf) {
-    std::vector<Keyed<K>> order(count);
+    std::vector<Keyed<K>> order;
+    resizeHuge(order, count);
     for (size_t i = 0; i < count; ++i) order[i] = {static_cast<K>(frame.keyOf(placeOf(i))), static_cast<uint32_t>(i)};
     radixSort(order);
     return order;
@@ -52,7 +56,8 @@ std::vector<Keyed<K>> inOrder(const Frame& frame, size_t count, const PlaceOf& p
 
 template <typename T, typename K>
 void permute(std::vector<T>& values, const std::vector<Keyed<K>>& order) {
-    std::vector<T> sorted(order.size());
+    std::vector<T> sorted;
+    resizeHuge(sorted, order.size());
     for (size_t i = 0; i < order.size(); ++i) sorted[i] = values[order[i].index];
     values.swap(sorted);
 }
@@ -90,7 +95,7 @@ SortResult sortBytesBy(const Frame& frame, const RecordLayout& layout, const std
     std::vector<Keyed<K>> order = inOrder<K>(frame, count, [&](size_t i) { return p.place(i); });
     const size_t most = mergeDuplicates ? 1 : kMostAtOnePlace;
     std::vector<Keyed<K>> kept;
-    kept.reserve(count);
+    reserveHuge(kept, count);
     const auto placeOf = [&](uint32_t i) { return p.place(i); };
     const auto isLess = [&](const Keyed<K>& a, const Keyed<K>& b) {
         return std::memcmp(bytes.data() + a.index * stride, bytes.data() + b.index * stride, stride) < 0;
