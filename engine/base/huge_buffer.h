@@ -1,5 +1,5 @@
-// A large array on huge pages where the system grants them: per-pixel buffers are written all over, and with 4 KiB
-// pages a third of the projection's time goes into page table walks.
+// Large arrays on huge pages where the system grants them: per-pixel buffers are written all over, and with 4 KiB
+// pages a third of the projection's time goes into page table walks; buckets of a build are touched once, page by page.
 #pragma once
 
 #include <sys/mman.h>
@@ -45,7 +45,7 @@ void reserveHuge(std::vector<T>& of, size_t count) {
     const uintptr_t begin = (first + kHuge - 1) / kHuge * kHuge, end = (first + count * sizeof(T)) / kHuge * kHuge;
     if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 }
-/// Resizes what is handed over as a vector in that way.
+/// Resizes a vector in that way: what it held is only kept where there was room.
 template <typename T>
 void resizeHuge(std::vector<T>& of, size_t count) {
     reserveHuge(of, count);

@@ -1,5 +1,7 @@
 #include "engine/cpu/pyramid.h"
 
+#include <bit>
+
 #include "engine/base/numbers.h"
 
 namespace stipple::cpu {
@@ -59,13 +61,12 @@ bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint
     const size_t at = size_t{y} * level.width + x;
     const uint32_t held = level.held(y, x, n);
     // (The next row of a tile is a level's width away, where no processor looks by itself.)
-    if (held != 0 && y + 1 < level.height) {
-        const Planes next = planes.at(at + level.width);
-        for (uint32_t i = 0; i < n; i += kTexelGroup) {
-            __builtin_prefetch(next.depth + i);
-            for (const uint32_t* plane : {next.size, next.offset, next.normal, next.colour})
-                __builtin_prefetch(plane + i);
-        }
+    const uint32_t next = y + 1 < level.height ? level.held(y + 1, x, n) : 0;
+    for (uint32_t rest = next; rest != 0; rest &= rest - 1) {
+        const Planes from = planes.at(at + level.width + static_cast<size_t>(std::countr_zero(rest)) * kTexelGroup);
+        __builtin_prefetch(from.depth);
+        for (const uint32_t* plane : {from.size, from.offset, from.normal, from.colour, from.surface})
+            if (plane != nullptr) __builtin_prefetch(plane);
     }
     return loadTexels(planes.at(at), held, kPad, n, row);
 }

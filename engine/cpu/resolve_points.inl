@@ -204,7 +204,8 @@ void gatherNothing(uint32_t n, Gathered& g) {
         g.z[first + i] = isOf[i] != 0 ? place.z : g.z[first + i];
     }
 }
-/// Places of the points of a row: of each few side by side one node after the other, which are mostly one or two.
+/// Places of the points of a row, and no radius where there is none: of each few side by side one node after the other,
+/// which are mostly one or two.
 void gatherPlaces(uint32_t n, Gathered& g) {
     alignas(64) int32_t isOf[kTexelGroup];
     for (size_t first = 0; first < n; first += kTexelGroup) {
@@ -292,13 +293,13 @@ void turnNormals(uint32_t n, Gathered& g) {
 }
 
 /// Empties the row's entries of the visibility buffer. `filtered`: of the row, or null: its points are their records.
-/// `seconds`: of the row; before some of its points other kinds are shown.
+/// `seconds`: of the row; before some of its points other kinds are shown. `hasNext`: it is not the picture's last row.
 void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const FilteredPixel* filtered,
-               const SecondPixels& seconds, uint64_t* visibility, uint32_t n, Gathered& g, OtherPixels& others,
-               GatheredKinds& kinds) {
+               const SecondPixels& seconds, uint64_t* visibility, bool hasNext, uint32_t n, Gathered& g,
+               OtherPixels& others, GatheredKinds& kinds) {
     const BlockRanges firstBlock = f.firstBlock;
     // (The next row of the tile is a picture's width away, where no processor looks by itself.)
-    for (uint32_t i = 0; i < n; i += 8) __builtin_prefetch(visibility + f.width + i);
+    for (uint32_t i = 0; hasNext && i < n; i += 8) __builtin_prefetch(visibility + f.width + i, 1);
     for (WinningPixels& p : others.of) p.count = 0;
     gatherNothing(n, g);
     // The pixels that show something, closed up without branches.
@@ -368,7 +369,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         seconds.kinds += first;
         seconds.places += first;
     }
-    gatherRow(f, tables, in.blocks, filtered, seconds, visibility, n, g, others, kinds);
+    gatherRow(f, tables, in.blocks, filtered, seconds, visibility, y + 1 < f.height, n, g, others, kinds);
     if (surface != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) surface[i] = 0;

@@ -13,7 +13,7 @@ constexpr size_t kNeighbours = 6;
 constexpr size_t kProbes = 24;  // their median is within a tenth of that of all
 constexpr float kPi = 3.14159265f;
 constexpr size_t kLanesOfSpacing = 16;
-constexpr float kRoundedUp = 1 + 1e-6f;  // more than three products and two sums of floats may be off
+constexpr float kRoundedUp = 1 + 1e-6f;  // more than what floats may be off, here and there
 
 }  // namespace
 

@@ -16,7 +16,8 @@ SHARED_FN float largestSplat(uint flags, float focal, uint height) {
 
 // The pixel of a splat, where p is its centre on the image: that which holds it, or, of one beside the picture whose
 // disc reaches in, the nearest at the border: its offset leads out there. -1 where it reaches no pixel. `c`: towards
-// the centre (sightTo); `radius`: px. `farther`: by what share of its radius a splat counts as deeper where several
+// the centre (sightTo); `radius`: px. `share`: how far beside the picture, of its reach, squared: below 1 where it
+// reaches a pixel, as where x is not -1. `farther`: by what share of its radius a splat counts as deeper where several
 // share a pixel: at the border, of those of one surface that which reaches in farthest is kept.
 const float kOffsetRadii = 16.0f;  // offsets are kept up to that many radii
 struct SplatPixel {

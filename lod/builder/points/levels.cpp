@@ -394,7 +394,7 @@ bool isCoarse(const Frame& frame, const SortedPoints& from, size_t begin, size_t
     Place before{};
     for (size_t i = begin; i < end; ++i) {
         const Place place = from.points.place(i);
-        // (Their == is a call.)
+        // (== of arrays is a call.)
         if (i > begin && place[0] == before[0] && place[1] == before[1] && place[2] == before[2]) continue;
         ++different;
         for (size_t k = 0; k < places.size(); ++k) {
