@@ -207,6 +207,7 @@ void gatherNothing(uint32_t n, Gathered& g) {
 /// Places of the points of a row, and no radius where there is none: of each few side by side one node after the other,
 /// which are mostly one or two.
 void gatherPlaces(uint32_t n, Gathered& g) {
+    constexpr int kNodesTogether = 4;
     alignas(64) int32_t isOf[kTexelGroup];
     for (size_t first = 0; first < n; first += kTexelGroup) {
         const size_t count = first + kTexelGroup < n ? kTexelGroup : n - first;
@@ -217,8 +218,18 @@ void gatherPlaces(uint32_t n, Gathered& g) {
             g.z[first + i] = -1.0f;
             g.radius[first + i] = (left >> i & 1u) != 0u ? g.radius[first + i] : 0.0f;
         }
-        while (left != 0u) {
+        for (int nodes = 0; left != 0u; ++nodes) {
             const DrawNode* const node = g.node[first + size_t(__builtin_ctz(left))];
+            if (nodes == kNodesTogether) {  // as of a forest from afar: one by one
+                for (; left != 0u; left &= left - 1u) {
+                    const size_t i = first + size_t(__builtin_ctz(left));
+                    const vec3 place = placeInNode(*g.node[i], g.positionXY[i], g.positionZ[i]);
+                    g.x[i] = place.x;
+                    g.y[i] = place.y;
+                    g.z[i] = place.z;
+                }
+                break;
+            }
             for (size_t i = 0; i < count; ++i) {
                 isOf[i] = g.node[first + i] == node ? 1 : 0;
                 left &= ~(uint32_t(isOf[i]) << i);
