@@ -46,9 +46,9 @@ class EffectRoom {
 
     void* at(size_t effect, size_t plane, size_t bytes) {
         rooms_.resize(render::effects().size());
-        std::vector<uint64_t>& room = rooms_.at(effect).planes.at(plane);
+        HugeVector<uint64_t>& room = rooms_.at(effect).planes.at(plane);
         const size_t words = (bytes + 7) / 8;
-        if (room.size() != words) room = std::vector<uint64_t>(words);
+        if (room.size() != words) room = HugeVector<uint64_t>(words);
         return room.data();
     }
     uint64_t bytesOf(size_t effect) const {
@@ -68,7 +68,7 @@ class EffectRoom {
 
   private:
     struct Room {
-        std::array<std::vector<uint64_t>, kPlanes> planes;
+        std::array<HugeVector<uint64_t>, kPlanes> planes;
         uint32_t idle = 0;  ///< frames
     };
     std::vector<Room> rooms_;
