@@ -128,8 +128,9 @@ struct Frame {
         std::vector<shared::ShadowMap> maps;
         std::vector<const float*> depths;  ///< of each
         std::vector<const uint32_t*> through;
-        uint32_t* masks = nullptr;  ///< Plane::shadows: a picture for each light that casts
-        bool areKept = false;       ///< they are those of this frame already
+        uint32_t* masks = nullptr;    ///< Plane::shadows: a picture for each light that casts
+        uint8_t* shadowed = nullptr;  ///< of each light the rows of tiles (tileRow): 0: all of it comes there, no mask
+        bool areKept = false;         ///< they are those of this frame already
     };
     Shadows shadows;
 

@@ -170,6 +170,18 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/ewa.inl"
 
+/// Of kTexelGroup values side by side those above 0, by fours joined. (GCC unrolls loops over so few, and makes no SIMD of
+/// them.)
+using FourBits [[gnu::vector_size(16), gnu::aligned(4), gnu::may_alias]] = int;
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // of groups that were filled
+[[gnu::always_inline]] inline FourBits aboveZeroOf(const float* values) {
+    static_assert(kTexelGroup == 16);
+    const auto* const four = reinterpret_cast<const FourBits*>(values);
+    return ((four[0] > 0) | (four[1] > 0)) | ((four[2] > 0) | (four[3] > 0));
+}
+#pragma GCC diagnostic pop
+[[gnu::always_inline]] inline bool isAny(FourBits b) { return ((b[0] | b[1]) | (b[2] | b[3])) != 0; }
 /// Not 0 where a value is above it. (As whole numbers: of comparisons of floats that are joined GCC makes no SIMD.)
 [[gnu::always_inline]] inline int aboveZero(float value) {
     const int bits = __builtin_bit_cast(int, value);
@@ -182,9 +194,7 @@ template <typename... Depths>
     int rest = 0;
     const uint32_t whole = n / kTexelGroup;
     for (uint32_t group = 0; group < whole; ++group) {
-        int any = 0;
-        for (size_t i = 0; i < kTexelGroup; ++i) any |= (aboveZero(depths[group * kTexelGroup + i]) | ...);
-        held |= (any != 0 ? 1u : 0u) << group;
+        held |= (isAny((aboveZeroOf(depths + group * kTexelGroup) | ...)) ? 1u : 0u) << group;
     }
     for (size_t i = size_t{whole} * kTexelGroup; i < n; ++i) rest |= (aboveZero(depths[i]) | ...);
     return held | (rest != 0 ? 1u : 0u) << whole;
@@ -198,7 +208,7 @@ template <typename... Depths>
         const uint32_t count = n - group * kTexelGroup;
         int any = 0;
         if (count >= kTexelGroup)
-            for (size_t i = 0; i < kTexelGroup; ++i) any |= aboveZero(first[i]);
+            any = isAny(aboveZeroOf(first)) ? 1 : 0;
         else
             for (size_t i = 0; i < count; ++i) any |= aboveZero(first[i]);
         held |= (any != 0 ? 1u : 0u) << group;

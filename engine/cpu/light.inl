@@ -149,7 +149,7 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
     for (uint32_t k = 0; k < f.lightCount; ++k) {
         const LightSource& light = input.lights[k];
         const uint32_t shadow = input.shadowSlots != nullptr ? input.shadowSlots[k] : 0;
-        if (shadow == 0 || shadow > row.shadowSlots) {
+        if (shadow == 0 || shadow > row.shadowSlots || !row.isShadowed[shadow - 1]) {
             addLight<false>(light, p.depth, nullptr, surfaceAt, n, sent.r, sent.g, sent.b);
             continue;
         }

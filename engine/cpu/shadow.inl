@@ -31,6 +31,33 @@ struct alignas(64) ShadowTaps {
     float red[kTile], green[kTile], blue[kTile];
 };
 
+/// Texels that are looked up: of each pixel the first one of four or the only one, and what is there; of four those side
+/// by side are read together.
+struct alignas(64) ShadowReads {
+    uint32_t at[kTile];
+    float column[kTile], row[kTile], depth[kTile];
+    float upper[2 * kTile], lower[2 * kTile];
+    uint32_t throughUpper[2 * kTile], throughLower[2 * kTile];
+};
+/// (One after another: a processor's gathers take longer, and would read each texel by itself.)
+template <typename T>
+[[gnu::always_inline]] inline void readFour(const T* __restrict from, uint32_t stride, const uint32_t* __restrict at,
+                                            size_t first, size_t last, T* __restrict upper, T* __restrict lower) {
+    for (size_t i = first; i < last; ++i) {
+        asm volatile("");  // no SIMD
+        const T* const texel = from + at[i];
+        __builtin_memcpy(upper + 2 * i, texel, 2 * sizeof(T));
+        __builtin_memcpy(lower + 2 * i, texel + stride, 2 * sizeof(T));
+    }
+}
+[[gnu::always_inline]] inline void readOne(const float* __restrict from, const uint32_t* __restrict at, size_t first,
+                                           size_t last, float* __restrict to) {
+    for (size_t i = first; i < last; ++i) {
+        asm volatile("");  // no SIMD
+        to[i] = from[at[i]];
+    }
+}
+
 /// `groups`: with a surface.
 [[gnu::always_inline]] inline void placePixels(const FrameConstants& f, const SurfaceRow& __restrict row, uint32_t x0,
                                                uint32_t y, uint32_t groups, uint32_t n, ShadowPixels& __restrict p) {
@@ -109,26 +136,68 @@ template <bool isPerspective>
     }
 }
 
+/// What comes past opaque casters to the places themselves.
+[[gnu::always_inline]] inline void sharesHere(const ShadowMap& m, const float* __restrict depths, size_t first,
+                                              size_t last, const ShadowPlaces& __restrict o, ShadowReads& reads,
+                                              float* __restrict share) {
+    ShadowReads& __restrict r = reads;
+#pragma GCC ivdep
+    for (size_t i = first; i < last; ++i) r.at[i] = shadowTexels(m, o.x[i], o.y[i]).at00;
+    readFour(depths, m.stride, r.at, first, last, r.upper, r.lower);
+#pragma GCC ivdep
+    for (size_t i = first; i < last; ++i)
+        share[i] = shareOfFour(o.at(i), shadowTexels(m, o.x[i], o.y[i]), r.upper[2 * i], r.upper[2 * i + 1],
+                               r.lower[2 * i], r.lower[2 * i + 1]);
+}
+
 /// Borders are hard, and no leaf is met.
 [[gnu::always_inline]] inline void hardShadows(const ShadowMap& map, const float* __restrict depths, size_t first,
-                                               size_t last, const ShadowPlaces& __restrict o,
+                                               size_t last, const ShadowPlaces& __restrict o, ShadowReads& reads,
                                                uint32_t* __restrict word) {
     const ShadowMap m = map;
+    alignas(64) float share[kTile];
+    sharesHere(m, depths, first, last, o, reads, share);
 #pragma GCC ivdep
     for (size_t i = first; i < last; ++i) {
-        const ShadowPlace s = o.at(i);
-        const uint32_t share = uint32_t(int(shadowShare(depths, nullptr, m, s, s.x, s.y) * 1023.0f + 0.5f));
+        const uint32_t past = uint32_t(int(share[i] * 1023.0f + 0.5f));
         const uint32_t before = word[i];
-        word[i] = o.isOn[i] > 0.5f ? share | share << 10 | share << 20 : before;
+        word[i] = o.isOn[i] > 0.5f ? past | past << 10 | past << 20 : before;
     }
+}
+
+/// Borders are hard. Where nothing is in the way, leaves need not be looked at. `groups`: with pixels on the map.
+[[gnu::always_inline]] inline void leafShadows(const ShadowMap& map, const float* __restrict depths,
+                                               const uint32_t* __restrict through, uint32_t groups, uint32_t n,
+                                               const ShadowPlaces& __restrict o, ShadowReads& reads,
+                                               uint32_t* __restrict word) {
+    const ShadowMap m = map;
+    ShadowReads& __restrict r = reads;
+    alignas(64) float share[kTile], isMet[kTile];
+    forGroups(groups, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+        sharesHere(m, depths, first, last, o, r, share);
+        for (size_t i = first; i < last; ++i) isMet[i] = share[i] < 1.0f ? o.isOn[i] : 0.0f;
+    });
+    forGroups(groupsHeldOf(groups, n, isMet), n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+        readFour(through, m.stride, r.at, first, last, r.throughUpper, r.throughLower);
+#pragma GCC ivdep
+        for (size_t i = first; i < last; ++i) {
+            const vec3 past = colourOfFour(o.at(i), shadowTexels(m, o.x[i], o.y[i]), r.upper[2 * i], r.upper[2 * i + 1],
+                                           r.lower[2 * i], r.lower[2 * i + 1], r.throughUpper[2 * i],
+                                           r.throughUpper[2 * i + 1], r.throughLower[2 * i], r.throughLower[2 * i + 1]);
+            const uint32_t packed = packLight(past), before = word[i];
+            word[i] = isMet[i] > 0.5f ? packed : before;
+        }
+    });
 }
 
 /// How wide penumbras are.
 template <bool isPerspective>
 [[gnu::always_inline]] inline void findPenumbras(const ShadowMap& map, const float* __restrict depths, size_t first,
-                                                 size_t last, const ShadowPlaces& __restrict o, ShadowTaps& taps) {
+                                                 size_t last, const ShadowPlaces& __restrict o, ShadowReads& reads,
+                                                 ShadowTaps& taps) {
     const ShadowMap m = map;
     ShadowTaps& __restrict t = taps;
+    ShadowReads& __restrict r = reads;
 #pragma GCC ivdep
     for (size_t i = first; i < last; ++i) {
         t.reach[i] = casterReach(m, isPerspective, o.at(i));
@@ -137,19 +206,32 @@ template <bool isPerspective>
         t.sum[i] = 0.0f;
         t.count[i] = 0.0f;
     }
-    for (uint32_t k = 0; k < kShadowTaps; ++k)
+    for (uint32_t k = 0; k < kShadowTaps; ++k) {
+#pragma GCC ivdep
+        for (size_t i = first; i < last; ++i) {
+            const CasterTexel texel = casterTexel(m, o.at(i), t.reach[i], k, vec2(t.x[i], t.y[i]));
+            r.column[i] = texel.column;
+            r.row[i] = texel.row;
+            r.at[i] = texel.at;
+        }
+        readOne(depths, r.at, first, last, r.depth);
 #pragma GCC ivdep
         for (size_t i = first; i < last; ++i) {
             ShadowCasters c;
             c.direction = vec2(t.x[i], t.y[i]);
             c.sum = t.sum[i];
             c.count = t.count[i];
-            c = lookForCaster(depths, nullptr, m, o.at(i), t.reach[i], k, c);
+            CasterTexel texel;
+            texel.column = r.column[i];
+            texel.row = r.row[i];
+            texel.at = 0u;
+            c = withCaster(o.at(i), texel, r.depth[i], c);
             t.x[i] = c.direction.x;
             t.y[i] = c.direction.y;
             t.sum[i] = c.sum;
             t.count[i] = c.count;
         }
+    }
 #pragma GCC ivdep
     for (size_t i = first; i < last; ++i) {
         ShadowCasters c;
@@ -164,45 +246,50 @@ template <bool isPerspective>
 template <bool hasLeaves>
 [[gnu::always_inline]] inline void addPast(const ShadowMap& m, const float* __restrict depths,
                                            const uint32_t* __restrict through, uint32_t k, size_t first, size_t last,
-                                           const ShadowPlaces& __restrict o, ShadowTaps& taps) {
+                                           const ShadowPlaces& __restrict o, ShadowReads& reads, ShadowTaps& taps) {
     ShadowTaps& __restrict t = taps;
+    ShadowReads& __restrict r = reads;
+#pragma GCC ivdep
+    for (size_t i = first; i < last; ++i) {
+        const vec2 at = penumbraPlace(o.at(i), t.radius[i], k, vec2(t.x[i], t.y[i]));
+        r.at[i] = shadowTexels(m, at.x, at.y).at00;
+    }
+    readFour(depths, m.stride, r.at, first, last, r.upper, r.lower);
+    if (hasLeaves) readFour(through, m.stride, r.at, first, last, r.throughUpper, r.throughLower);
 #pragma GCC ivdep
     for (size_t i = first; i < last; ++i) {
         const vec2 direction = vec2(t.x[i], t.y[i]);
-        const vec3 past = lightInPenumbra(depths, through, m, hasLeaves, o.at(i), t.radius[i], k, direction);
+        const vec2 at = penumbraPlace(o.at(i), t.radius[i], k, direction);
+        const ShadowTexels texels = shadowTexels(m, at.x, at.y);
         const vec2 next = turnedGolden(direction);
         t.x[i] = next.x;
         t.y[i] = next.y;
+        const float d00 = r.upper[2 * i], d10 = r.upper[2 * i + 1], d01 = r.lower[2 * i], d11 = r.lower[2 * i + 1];
+        if (!hasLeaves) {
+            t.red[i] += shareOfFour(o.at(i), texels, d00, d10, d01, d11);
+            continue;
+        }
+        const vec3 past = colourOfFour(o.at(i), texels, d00, d10, d01, d11, r.throughUpper[2 * i],
+                                       r.throughUpper[2 * i + 1], r.throughLower[2 * i], r.throughLower[2 * i + 1]);
         t.red[i] += past.x;
-        if (!hasLeaves) continue;
         t.green[i] += past.y;
         t.blue[i] += past.z;
     }
 }
 
-/// Of lights that have a size, and past leaves. `groups`: with pixels on the map.
+/// Of lights that have a size. `groups`: with pixels on the map.
 template <bool isPerspective, bool hasLeaves>
 [[gnu::always_inline]] inline void softShadows(const ShadowMap& map, const float* depths, const uint32_t* through,
                                                uint32_t groups, uint32_t n, const ShadowPlaces& __restrict o,
-                                               ShadowTaps& taps, uint32_t* __restrict word) {
+                                               ShadowReads& reads, ShadowTaps& taps, uint32_t* __restrict word) {
     const ShadowMap m = map;
     ShadowTaps& __restrict t = taps;
     const auto each = [&](uint32_t of, const auto& use) __attribute__((always_inline)) {
         forGroups(of & groups, n, use);
     };
-    if (m.size > 0.0f)
-        each(
-            groups, [&](size_t first, size_t last)
-                        __attribute__((always_inline)) { findPenumbras<isPerspective>(m, depths, first, last, o, t); });
-    else
-        each(groups, [&](size_t first, size_t last) __attribute__((always_inline)) {
-    // Where nothing is in the way, leaves need not be looked at.
-#pragma GCC ivdep
-            for (size_t i = first; i < last; ++i) {
-                const ShadowPlace s = o.at(i);
-                t.radius[i] = shadowShare(depths, nullptr, m, s, s.x, s.y) < 1.0f ? 0.0f : -1.0f;
-            }
-        });
+    each(groups, [&](size_t first, size_t last) __attribute__((always_inline)) {
+        findPenumbras<isPerspective>(m, depths, first, last, o, reads, t);
+    });
     alignas(64) float isMet[kTile];
     each(groups, [&](size_t first, size_t last) __attribute__((always_inline)) {
 #pragma GCC ivdep
@@ -218,8 +305,9 @@ template <bool isPerspective, bool hasLeaves>
     const uint32_t met = groupsHeldOf(groups, n, isMet), wide = groupsHeldOf(groups, n, t.isWide);
     const auto add = [&](uint32_t k, uint32_t of) __attribute__((always_inline)) {
         each(
-            of, [&](size_t first, size_t last)
-                    __attribute__((always_inline)) { addPast<hasLeaves>(m, depths, through, k, first, last, o, t); });
+            of, [&](size_t first, size_t last) __attribute__((always_inline)) {
+                addPast<hasLeaves>(m, depths, through, k, first, last, o, reads, t);
+            });
     };
     add(0, met);
     // Of borders that are hard in a penumbra's neighbourhood the first place is all there is.
@@ -258,6 +346,7 @@ void shadowRow(const FrameConstants& frame, const ShadowInput& in, uint32_t x0, 
     const FrameConstants f = frame;
     ShadowPixels p;
     ShadowPlaces o;
+    ShadowReads r;
     ShadowTaps t;
     const uint32_t seen = groupsHeld(n, row.depth);
     placePixels(f, row, x0, y, seen, n, p);
@@ -289,8 +378,12 @@ void shadowRow(const FrameConstants& frame, const ShadowInput& in, uint32_t x0, 
         uint32_t* const word = row.shadow[slot];
         if (!(m.size > 0.0f) && m.hasLeaves == 0u) {
             forGroups(on, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
-                hardShadows(m, in.depths[k], first, last, o, word);
+                hardShadows(m, in.depths[k], first, last, o, r, word);
             });
+            continue;
+        }
+        if (!(m.size > 0.0f)) {
+            leafShadows(m, in.depths[k], in.through[k], on, n, o, r, word);
             continue;
         }
         if (!hasTaps)
@@ -301,12 +394,17 @@ void shadowRow(const FrameConstants& frame, const ShadowInput& in, uint32_t x0, 
             }
         hasTaps = true;
         if (isPerspective && m.hasLeaves != 0u)
-            softShadows<true, true>(m, in.depths[k], in.through[k], on, n, o, t, word);
+            softShadows<true, true>(m, in.depths[k], in.through[k], on, n, o, r, t, word);
         else if (isPerspective)
-            softShadows<true, false>(m, in.depths[k], in.through[k], on, n, o, t, word);
+            softShadows<true, false>(m, in.depths[k], in.through[k], on, n, o, r, t, word);
         else if (m.hasLeaves != 0u)
-            softShadows<false, true>(m, in.depths[k], in.through[k], on, n, o, t, word);
+            softShadows<false, true>(m, in.depths[k], in.through[k], on, n, o, r, t, word);
         else
-            softShadows<false, false>(m, in.depths[k], in.through[k], on, n, o, t, word);
+            softShadows<false, false>(m, in.depths[k], in.through[k], on, n, o, r, t, word);
+    }
+    for (uint32_t k = 0; k < in.slots; ++k) {
+        uint32_t lost = 0;
+        for (size_t i = 0; i < n; ++i) lost |= row.shadow[k][i] ^ kAllLight;
+        row.isShadowed[k] = lost != 0;
     }
 }

@@ -67,7 +67,9 @@ class Receiver {
         const double angle = turn_ + k * kTurn / 2 * (3 - std::sqrt(5.0));
         return std::sqrt((k + off) / 16) * dvec2(std::cos(angle), std::sin(angle));
     }
-    size_t texel(int x, int y) const { return static_cast<size_t>(y) * view_.width + static_cast<size_t>(x); }
+    size_t texel(int x, int y) const {
+        return static_cast<size_t>(y) * shared::shadowStride(view_.width) + static_cast<size_t>(x);
+    }
     /// Depth of what hides the plane at a texel.
     std::optional<double> casterAt(int x, int y) const {
         const double plane = place_.z - bias_ + glm::dot(slope_, dvec2(x + 0.5, y + 0.5) - image),

@@ -84,19 +84,23 @@ ShadowMapOf mapOf(const ShadowView& of, const Image& image, double eyeAdvanced, 
     ShadowMapOf map;
     map.of = of;
     auto texels = std::make_shared<ShadowTexels>();
-    texels->depth.resize(image.depth.size());
+    const size_t edge = image.width, stride = shared::shadowStride(image.width);
+    texels->depth.resize(stride * edge);
     const double shift = eyeAdvanced - of.centreDepth;
     float farthest = 0, nearest = std::numeric_limits<float>::infinity();
     uint32_t through = 0;
     for (size_t i = 0; i < image.depth.size(); ++i) {
         const float depth = image.depth[i];
         const bool isMet = depth > 0;
-        texels->depth[i] = isMet ? static_cast<float>(double{depth} + shift) : std::numeric_limits<float>::infinity();
+        float& texel = texels->depth[i / edge * stride + i % edge];
+        texel = isMet ? static_cast<float>(double{depth} + shift) : std::numeric_limits<float>::infinity();
         farthest = std::max(farthest, depth);
-        nearest = std::min(nearest, texels->depth[i]);
+        nearest = std::min(nearest, texel);
         through |= isMet ? image.rgba[i] : 0;
     }
-    if (through != 0) texels->through = image.rgba;
+    if (through != 0) texels->through.resize(stride * edge);
+    for (size_t y = 0; through != 0 && y < edge; ++y)
+        std::copy_n(image.rgba.data() + y * edge, edge, texels->through.data() + y * stride);
     map.texels = std::move(texels);
     map.nearest = nearest;
     map.casterError = tau / of.view.focalPixels;

@@ -15,7 +15,7 @@ namespace stipple::render {
 inline constexpr Mode kCasterMode = Mode::splat;
 std::vector<Pass> passesOfCasters(const FrameContent& content);
 
-/// What a light meets first, a texel at a time; row by row.
+/// What a light meets first, a texel at a time; row by row, shadowStride (shaders/shared/shadow.h) apart.
 struct ShadowTexels {
     std::vector<float> depth;       ///< world units from the map's centre on; where nothing is met: infinity
     std::vector<uint32_t> through;  ///< throughLeaf of shaders/shared/shade.h, or 0; empty: no leaf is met

@@ -31,6 +31,7 @@ struct ShadowMap {
     float nearest;       // depth of the nearest caster
     float size;          // directional: tangent of the light's angular radius; spot: its radius; 0: borders are hard
     uint edge;           // texels
+    uint stride;         // texels from one row to the next (shadowStride)
     uint first;          // of its texels among those of all maps
     uint slot;           // of the light's mask
     uint isPerspective;
@@ -43,6 +44,9 @@ const float kShadowRounding = 4.76837158e-7f;  // of places in camera space, ove
 const float kMostPenumbra = 0.0625f;           // radius, over the map's edge
 const uint kShadowTaps = 16u;
 const uint kAllLight = 0x3fffffffu;
+
+// Of a map: rows of a power of two would lie in the same few lines of a cache.
+SHARED_FN uint shadowStride(uint edge) { return edge + 16u; }
 
 // A place of a surface as a map sees it.
 struct ShadowPlace {
@@ -116,9 +120,9 @@ SHARED_FN ShadowTexels shadowTexels(ShadowMap m, float x, float y) {
     t.row = min(floor(top), last - 1.0f);
     t.across = left - t.column;
     t.along = top - t.row;
-    t.at00 = m.first + uint(int(t.row)) * m.edge + uint(int(t.column));
+    t.at00 = m.first + uint(int(t.row)) * m.stride + uint(int(t.column));
     t.at10 = t.at00 + 1u;
-    t.at01 = t.at00 + m.edge;
+    t.at01 = t.at00 + m.stride;
     t.at11 = t.at01 + 1u;
     return t;
 }

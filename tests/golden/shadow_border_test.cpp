@@ -37,19 +37,22 @@ struct Border {
         return count / double(errors.size());
     }
 };
-/// Pixels of the floor that the mask has on the wrong side of the border, or beside its own: distances on the picture.
-Border borderOf(const Mask& mask, const lod::View& view, const render::WorldLight& light, const dvec3& ball = kBall) {
-    Border border;
+/// Of pixels of the floor: how far they are from the border (inside below 0), what comes to them, and the error that is
+/// stated there, pixels of the picture.
+struct FloorPixel {
+    double apart, share, stated;
+};
+/// `texels`: so many count as one.
+std::vector<FloorPixel> floorOf(const Mask& mask, const lod::View& view, const render::WorldLight& light,
+                                const dvec3& ball, double texels = 1) {
+    std::vector<FloorPixel> floor;
     const render::Image& image = mask.state->image;
     const render::ShadowMaps& maps = *mask.state->draws.shadowMaps;
     for (size_t i = 0; i + view.width < mask.share.size(); ++i) {
         if (!(image.depth[i] > 0) || mask.share[i] < 0) continue;
         const dvec3 p = placeOf(view, i, double{image.depth[i]});
         if (std::abs(p.z) > 1e-3 || std::abs(p.x) > 1.9 || std::abs(p.y) > 1.9) continue;
-        const double apart = fromBorder(p, light, ball);
-        const bool isWrong = (apart < 0) != (mask.share[i] < 0.5);
-        if (!isWrong) continue;
-        const double distance = glm::length(p - view.eye);
+        const double apart = fromBorder(p, light, ball), distance = glm::length(p - view.eye);
         const double offAxis = view.isOrthographic ? 1 : glm::dot(p - view.eye, view.forward) / distance;
         const dvec3 l = light.kind == shared::kLightDirectional ? -light.direction : glm::normalize(light.position - p);
         const auto used = std::find_if(maps.maps.begin(), maps.maps.end(), [&](const render::ShadowMapOf& m) {
@@ -58,10 +61,24 @@ Border borderOf(const Mask& mask, const lod::View& view, const render::WorldLigh
         EXPECT_TRUE(used != maps.maps.end());
         if (used == maps.maps.end()) continue;
         const double deep = used->of.view.isOrthographic ? 1 : glm::dot(p - used->of.view.eye, used->of.view.forward);
-        const double error = used->casterError * deep, texel = deep / used->of.view.focalPixels,
+        const double error = used->casterError * deep, texel = texels * deep / used->of.view.focalPixels,
                      surface = maps.surfaceError / view.focalPixels * (view.isOrthographic ? 1 : distance);
-        border.errors.push_back(render::shadowErrorPixels(view, distance, offAxis, l.z, std::abs(apart), 0, 0));
-        border.stated.push_back(render::shadowErrorPixels(view, distance, offAxis, l.z, error, texel, error + surface));
+        const auto pixels = [&](double world, double ofTexel, double bias) {
+            return render::shadowErrorPixels(view, distance, offAxis, l.z, world, ofTexel, bias);
+        };
+        floor.push_back({std::copysign(pixels(std::abs(apart), 0, 0), apart), mask.share[i],
+                         pixels(error, texel, error + surface)});
+    }
+    return floor;
+}
+
+/// Pixels of the floor that the mask has on the wrong side of the border, or beside its own: distances on the picture.
+Border borderOf(const Mask& mask, const lod::View& view, const render::WorldLight& light, const dvec3& ball = kBall) {
+    Border border;
+    for (const FloorPixel& p : floorOf(mask, view, light, ball)) {
+        if ((p.apart < 0) == (p.share < 0.5)) continue;
+        border.errors.push_back(std::abs(p.apart));
+        border.stated.push_back(p.stated);
     }
     return border;
 }
@@ -91,6 +108,39 @@ TEST_F(ShadowBackends, BordersAreWhereTheClosedFormHasThem) {
                 EXPECT_GT(border.beyond(0.01), 0.1) << "the control: a hundredth of what is stated would not hold";
                 // Nothing but the ball's shadow is dark: no acne, and no light beneath it.
                 EXPECT_LT(border.errors.size(), shaded / 4);
+            }
+}
+
+// Beyond the stated error (and the four texels that are weighed) floors are lit or dark all through: no halo about the
+// shadow, none beside the ball's silhouette, no specks of light in it.
+TEST_F(ShadowBackends, NothingIsBesideTheRim) {
+    constexpr double kTexels = 2.5, kLeast = 1e-3;
+    test::writePly(folder_ / "a.ply", floorAndBall(), true, true);
+    const auto points = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_),
+               mesh = triangles(folder_ / "b.stipple", *executor_);
+    for (const bool isOrthographic : {false, true})
+        for (const auto& store : {points, mesh})
+            for (const render::WorldLight& light : {sun(), spot()}) {
+                SCOPED_TRACE(testing::Message() << (isOrthographic ? "orthographic, " : "perspective, ")
+                                                << (store == mesh ? "triangles, " : "points, ")
+                                                << (light.kind == shared::kLightSpot ? "spot" : "sun"));
+                const lod::View view = viewOf(isOrthographic);
+                const Mask mask = maskOf(store, usual(), *executor_, view, under(light));
+                ASSERT_TRUE(mask.state->draws.shadowMaps);
+                size_t beside = 0, within = 0, nearer = 0;
+                const std::vector<FloorPixel> floor = floorOf(mask, view, light, kBall, kTexels);
+                for (const FloorPixel& p : floor) {
+                    const double off = p.apart < 0 ? p.share : std::abs(1 - p.share), away = std::abs(p.apart);
+                    beside += away > p.stated && off > kLeast ? 1 : 0;
+                    nearer += away > 0.1 * p.stated && off > kLeast ? 1 : 0;
+                    within += p.apart < -p.stated ? 1 : 0;
+                }
+                std::printf("%zu pixels of the floor, %zu well within the shadow; %zu are neither lit nor dark\n",
+                            floor.size(), within, beside);
+                EXPECT_GT(floor.size(), 5'000u);
+                EXPECT_GT(within, 200u);
+                EXPECT_EQ(beside, 0u);
+                EXPECT_GT(nearer, 50u) << "the control: a tenth of what is stated would not hold";
             }
 }
 

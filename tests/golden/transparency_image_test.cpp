@@ -244,5 +244,167 @@ TEST_F(Transparent, LeavesTheAlphaOfPicturesWhatIsCovered) {
     }
 }
 
+/// A square of one colour, facing +z.
+scene::Primitive pane(double edge, const glm::vec3& colour) {
+    scene::Primitive mesh;
+    for (const auto& [x, y] : {std::pair{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}) {
+        mesh.position.emplace_back(edge * x, edge * y, 0);
+        mesh.normal.emplace_back(0, 0, 1);
+        mesh.colour.emplace_back(colour, 1);
+    }
+    for (const uint32_t k : {0u, 1u, 2u, 0u, 2u, 3u}) mesh.indices.push_back(k);
+    return mesh;
+}
+
+// Of more bodies than are kept apart the farthest are one, of which the nearest is seen at each pixel: what is behind
+// all of them is still there, and no more is lost than what the others of them would have added.
+TEST_F(Transparent, BehindMoreBodiesThanAreKeptApartIsWhatIsBehindTheLast) {
+    constexpr size_t kPanes = 12, kApart = render::kMostBodies - 1, kTogether = kPanes - kApart;
+    constexpr double kAlpha = 51.0 / 255, kEdge = 1.6, kRim = 0.03;
+    const std::array colours{glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)};
+    std::vector<std::shared_ptr<const lod::Store>> stores;
+    for (size_t c = 0; c < colours.size(); ++c)
+        stores.push_back(test::meshStore(pane(kEdge, colours.at(c)), blended(static_cast<float>(kAlpha), true),
+                                         folder_ / ("pane" + std::to_string(c)), *executor_));
+    const lod::View view = test::glassView({0.5, 0.4, 3.6}, 160);
+    // The farthest first; each a little aside, so that numbers differ from pixel to pixel.
+    std::vector<glm::dvec3> centres;
+    for (size_t k = 0; k < kPanes; ++k)
+        centres.emplace_back(0.04 * static_cast<double>(k % 4), 0.03 * static_cast<double>(k % 5),
+                             -1.6 + 0.2 * static_cast<double>(k));
+    std::vector<render::PlacedStore> placed{{board_, {}, {}}};
+    for (size_t k = 0; k < kPanes; ++k) {
+        const size_t other = 5 * k % kPanes;  // in any order
+        placed.push_back({stores[other % stores.size()], {}, {}});
+        placed.back().place.translation = centres[other];
+    }
+    for (auto& [name, backend] : backends_) {
+        render::FrameSettings settings = test::glassSettings(render::Mode::surface);
+        settings.draw.unlitTriangles = true;
+        const render::Image behind = draw({{board_, {}, {}}}, *backend, settings),
+                            all = draw(placed, *backend, settings);
+        double off = 0, overBound = 0, lost = 0, withoutFar = 0, withoutBoard = 0;
+        size_t deepest = 0, pixels = 0;
+        for (size_t i = 0; i < all.rgba.size(); ++i) {
+            const glm::dvec3 ray = view.forward + (double(i % 160) + 0.5 - 80) / view.focalPixels * view.right +
+                                   (double(i / 160) + 0.5 - 80) / view.focalPixels * view.down;
+            bool isAtRim = false;
+            std::vector<size_t> met;
+            for (size_t k = 0; k < kPanes; ++k) {
+                const glm::dvec3 d = view.eye + (centres[k].z - view.eye.z) / ray.z * ray - centres[k];
+                const double out = std::max(std::abs(d.x), std::abs(d.y)) - 0.5 * kEdge;
+                isAtRim = isAtRim || std::abs(out) < kRim;
+                if (out < 0) met.push_back(k);
+            }
+            if (isAtRim || met.empty()) continue;
+            ++pixels;
+            const auto isFar = [&](size_t k) { return k < kTogether; };
+            const auto far = static_cast<size_t>(std::count_if(met.begin(), met.end(), isFar));
+            deepest = std::max(deepest, far);
+            const double passed = std::pow(1 - kAlpha, static_cast<double>(met.size() - far)),
+                         bound = far < 2
+                                     ? 0
+                                     : passed * (1 - kAlpha) * (1 - std::pow(1 - kAlpha, static_cast<double>(far - 1)));
+            for (size_t c = 0; c < 3; ++c) {
+                const double board = behind.linear[3 * i + c], shown = all.linear[3 * i + c];
+                // Over what is behind them, those from number `first` of them on.
+                const auto over = [&](double under, size_t first) {
+                    for (size_t m = first; m < met.size(); ++m)
+                        under += kAlpha * (double{colours.at(met[m] % 3)[static_cast<int>(c)]} - under);
+                    return under;
+                };
+                const double truth = over(board, 0), together = over(board, far > 0 ? far - 1 : 0);
+                off = std::max(off, std::abs(shown - together));
+                overBound = std::max(overBound, std::abs(shown - truth) - bound);
+                lost = std::max(lost, std::abs(shown - truth));
+                withoutFar = std::max(withoutFar, std::abs(shown - over(board, far)));
+                withoutBoard = std::max(withoutBoard, std::abs(shown - over(0, far > 0 ? far - 1 : 0)));
+            }
+        }
+        EXPECT_GT(pixels, 5'000u);
+        EXPECT_EQ(deepest, kTogether);
+        std::printf("%-8s %.4f off; of all of them apart %.3f\n", name.c_str(), off, lost);
+        EXPECT_LE(off, 2e-3) << name;
+        EXPECT_LE(overBound, 2e-3) << name;
+        EXPECT_GT(lost, 0.02) << name << ", the control: they are not all apart";
+        EXPECT_GT(withoutFar, 0.02) << name << ", the control: the farthest are there";
+        EXPECT_GT(withoutBoard, 0.02) << name << ", the control: and what is behind them";
+    }
+}
+
+/// What of its neighbours a pixel is: covered beside one that is not.
+bool isRim(const render::Image& image, uint32_t width, size_t i) {
+    const auto isIn = [&](size_t k) { return (image.rgba[k] >> 24) != 0; };
+    return isIn(i) && !(isIn(i - 1) && isIn(i + 1) && isIn(i - width) && isIn(i + width));
+}
+
+// A body's picture ends where the body does, in every mode and of every kind: beside it there is what would be there
+// without it, bit by bit; at its rim its own share over the rest of what is behind, and none of the background.
+TEST_F(Transparent, NothingIsBesideTheRim) {
+    constexpr uint32_t kWidth = 160;
+    lod::Optics thin;
+    thin.blends = true;
+    thin.opacity = kShare;
+    const lod::View view = test::glassView({0.5, 0.4, 3.6}, kWidth);
+    const double pixelsOfUnit = view.focalPixels / glm::length(view.eye);
+    const glm::vec3 bright(1, 0.6f, 0.9f);
+    for (const render::Reconstruction& mode : render::reconstructions())
+        for (const auto& body : {ball_, points_, curves_, patches_}) {
+            const bool isRound = body != curves_ && !(body == points_ && mode.mode == render::Mode::points);
+            for (auto& [name, backend] : backends_) {
+                SCOPED_TRACE(testing::Message() << name << ", mode " << mode.name
+                                                << (body == ball_     ? ", triangles"
+                                                    : body == points_ ? ", points"
+                                                    : body == curves_ ? ", curves"
+                                                                      : ", patches"));
+                render::FrameSettings settings = test::glassSettings(mode.mode);
+                if (body != ball_) settings.draw.optics = thin;
+                settings.draw.background = glm::vec3(0);
+                const render::Image behind = draw({{board_, {}, {}}}, *backend, settings),
+                                    with = draw({{board_, {}, {}}, {body, {}, {}}}, *backend, settings),
+                                    alone = draw({{body, {}, {}}}, *backend, settings);
+                settings.draw.background = bright;
+                const render::Image before = draw({{board_, {}, {}}, {body, {}, {}}}, *backend, settings),
+                                    aloneBefore = draw({{body, {}, {}}}, *backend, settings);
+                size_t beside = 0, rims = 0, holes = 0, outside = 0;
+                double off = 0, ofBackground = 0, control = 0, opaque = 0;
+                for (size_t i = kWidth + 1; i + kWidth + 1 < with.rgba.size(); ++i) {
+                    const double alpha = static_cast<double>(alone.rgba[i] >> 24) / 255;
+                    const glm::dvec3 ray =
+                        glm::normalize(view.forward + (double(i % kWidth) + 0.5 - 80) / view.focalPixels * view.right +
+                                       (double(i / kWidth) + 0.5 - 80) / view.focalPixels * view.down);
+                    const double from = (glm::length(glm::cross(view.eye, ray)) - 1) * pixelsOfUnit;
+                    const double reach = body == points_ ? 4 : 2;
+                    holes += isRound && from < -reach && alpha == 0 ? 1 : 0;
+                    outside += isRound && from > reach && alpha > 0 ? 1 : 0;
+                    rims += isRim(alone, kWidth, i) ? 1 : 0;
+                    if (alpha == 0) {
+                        ++beside;
+                        ASSERT_EQ(with.rgba[i], behind.rgba[i]) << "at " << i;
+                        ASSERT_EQ(with.depth[i], behind.depth[i]) << "at " << i;
+                    }
+                    for (size_t c = 3 * i; c < 3 * i + 3; ++c) {
+                        const double under = behind.linear[c], own = alone.linear[c];
+                        off = std::max(off, std::abs(double{with.linear[c]} - (own + (1 - alpha) * under)));
+                        ofBackground =
+                            std::max(ofBackground, std::abs(double{with.linear[c]} - double{before.linear[c]}));
+                        if (!isRim(alone, kWidth, i)) continue;
+                        control = std::max(control, std::abs(double{alone.linear[c]} - double{aloneBefore.linear[c]}));
+                        opaque = std::max(opaque, std::abs(double{with.linear[c]} - under));
+                    }
+                }
+                EXPECT_GT(beside, 2'000u);
+                EXPECT_GT(rims, 100u);
+                EXPECT_EQ(holes, 0u);
+                EXPECT_EQ(outside, 0u);
+                constexpr double kHalfByte = 0.5 / 255;  // coverage is a byte
+                EXPECT_LE(off, kHalfByte + 1e-4);
+                EXPECT_LE(ofBackground, kHalfByte + 1e-4);
+                EXPECT_GT(control, 0.1) << "the control: without the board the background is seen there";
+                EXPECT_GT(opaque, 0.05) << "the control: the rim is there";
+            }
+        }
+}
+
 }  // namespace
 }  // namespace stipple

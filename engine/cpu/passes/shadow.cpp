@@ -8,6 +8,8 @@
 namespace stipple::cpu {
 namespace {
 
+size_t tileRows(Frame& frame) { return frame.tileRow(0, frame.constants.height); }
+
 /// Tables of the maps, room for the masks, and whether those still hold: before them stands what they are of.
 void begin(Frame& frame) {
     Frame::Shadows& s = frame.shadows;
@@ -25,6 +27,7 @@ void begin(Frame& frame) {
     const size_t words = size_t{draws.shadowSlots} * frame.constants.width * frame.constants.height;
     uint32_t* const room = frame.room<uint32_t>(0, kKeyWords + words);
     s.masks = room + kKeyWords;
+    s.shadowed = frame.room<uint8_t>(1, draws.shadowSlots * tileRows(frame));
     uint64_t key = 0;
     std::memcpy(&key, room, sizeof(key));
     s.areKept = draws.shadowKey != 0 && key == draws.shadowKey;
@@ -36,13 +39,22 @@ void run(const RowPlace& at, SurfaceRow& row) {
     const uint32_t slots = frame.draws->shadowSlots;
     const size_t pixels = size_t{frame.constants.width} * frame.constants.height;
     const auto kept = [&](uint32_t slot) { return frame.shadows.masks + slot * pixels + at.first; };
+    const auto shadowed = [&](uint32_t slot) -> uint8_t& {
+        return frame.shadows.shadowed[slot * tileRows(frame) + frame.tileRow(at.x0, at.y)];
+    };
     if (frame.shadows.areKept) {
         row.shadowSlots = slots;
-        for (uint32_t s = 0; s < slots; ++s) std::copy_n(kept(s), at.n, row.shadow[s]);
+        for (uint32_t s = 0; s < slots; ++s) {
+            row.isShadowed[s] = shadowed(s) != 0;
+            if (row.isShadowed[s]) std::copy_n(kept(s), at.n, row.shadow[s]);
+        }
         return;
     }
     frame.k.shadowRow(frame.constants, shadowInputOf(frame), at.x0, at.y, at.n, row);
-    for (uint32_t s = 0; s < slots && frame.draws->shadowKey != 0; ++s) std::copy_n(row.shadow[s], at.n, kept(s));
+    for (uint32_t s = 0; s < slots && frame.draws->shadowKey != 0; ++s) {
+        shadowed(s) = row.isShadowed[s] ? 1 : 0;
+        if (row.isShadowed[s]) std::copy_n(row.shadow[s], at.n, kept(s));
+    }
 }
 
 /// These are not kept.

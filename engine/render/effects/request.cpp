@@ -26,6 +26,41 @@ std::vector<std::string> split(const std::string& text, char at) {
     return parts;
 }
 
+// The names of all builds, whatever this one leaves out.
+#pragma push_macro("STIPPLE_ONLY_LIGHT")
+#undef STIPPLE_ONLY_LIGHT
+constexpr std::array kNamesOfAllBuilds{
+#define STIPPLE_EFFECT(name) #name,
+#include "engine/render/effects/effects.inl"
+#undef STIPPLE_EFFECT
+};
+#pragma pop_macro("STIPPLE_ONLY_LIGHT")
+
+bool isLeftOutOfBuild(std::string_view name) {
+    return effectNamed(name) == nullptr &&
+           std::find(kNamesOfAllBuilds.begin(), kNamesOfAllBuilds.end(), name) != kNamesOfAllBuilds.end();
+}
+
+/// What options of their own ask for, where no manifest is there to say so.
+struct AskedByOption {
+    const char *name, *option;
+    bool (*isAsked)(const DrawSettings& settings);
+    void (*leaveOut)(DrawSettings& settings);
+};
+constexpr std::array kAskedByOptions{
+    AskedByOption{"shadow", "--sun",
+                  [](const DrawSettings& s) {
+                      return std::any_of(s.lights.begin(), s.lights.end(),
+                                         [](const WorldLight& l) { return l.isSun && l.castsShadow; });
+                  },
+                  [](DrawSettings& s) {
+                      for (WorldLight& l : s.lights) l.castsShadow = false;
+                  }},
+    AskedByOption{"wind", "--wind", [](const DrawSettings& s) { return s.wind.strength > 0; },
+                  [](DrawSettings& s) { s.wind.strength = 0; }},
+    AskedByOption{"background", "--background environment", [](const DrawSettings& s) { return s.backdrop != nullptr; },
+                  [](DrawSettings& s) { s.backdrop.reset(); }}};
+
 /// Is it for a list to ask for it, or to leave it out?
 bool isListed(const Effect& e) { return e.isRequested == nullptr || e.leaveOut != nullptr; }
 
@@ -45,6 +80,9 @@ struct Wanted {
 
 Result<const Effect*> effectIn(const std::string& name) {
     const Effect* const e = effectNamed(name);
+    if (e == nullptr && isLeftOutOfBuild(name))
+        return fail(ErrorKind::usage, fmt::format("'{}' is not compiled into this program", name), kOption,
+                    "leave it out, or take a build without -DSTIPPLE_EFFECTS=OFF");
     if (e == nullptr)
         return fail(ErrorKind::usage, fmt::format("'{}' is not an effect", name), kOption,
                     "scene, auto, none, or some of: " + effectNames());
@@ -235,6 +273,13 @@ Result<std::vector<std::string>> requestEffects(const EffectWishes& wishes, cons
     settings.parameters = {};
     settings.parameters.facts = facts;
     leaveOut(wishes, wanted, settings, notes);
+    for (const AskedByOption& asked : kAskedByOptions) {
+        if (!isLeftOutOfBuild(asked.name) || !asked.isAsked(settings)) continue;
+        asked.leaveOut(settings);
+        notes.push_back(fmt::format(
+            "{} asks for {}, which is not compiled into this program (-DSTIPPLE_EFFECTS=OFF): pictures are without it",
+            asked.option, asked.name));
+    }
     for (const Effect* e : wanted.named) {
         if (e->isRequested != nullptr && !e->isRequested(settings))
             return fail(ErrorKind::usage, fmt::format("{} needs {} to say how much", e->name, e->option),

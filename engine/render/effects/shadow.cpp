@@ -42,6 +42,7 @@ shared::ShadowMap inCamera(const ShadowMapOf& map, const DrawList& draws, const 
     m.nearest = static_cast<float>(map.nearest);
     m.size = static_cast<float>(map.of.size);
     m.edge = light.width;
+    m.stride = shared::shadowStride(light.width);
     m.slot = map.of.slot;
     m.isPerspective = light.isOrthographic ? 0 : 1;
     m.hasLeaves = map.texels->through.empty() ? 0 : 1;
