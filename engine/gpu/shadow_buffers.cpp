@@ -9,7 +9,7 @@ namespace stipple::gpu {
 namespace {
 
 template <typename T>
-Result<Buffer> bufferOf(const Device& device, const HugeVector<T>& values, const char* name) {
+Result<Buffer> bufferOf(const Device& device, const std::vector<T>& values, const char* name) {
     constexpr VkBufferUsageFlags kRead = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
     const uint64_t bytes = values.size() * sizeof(T);
     STIPPLE_ASSIGN(const uint64_t room, roomFor(device.limits, bytes, kRead, name, device.deviceName));
