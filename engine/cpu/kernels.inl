@@ -149,6 +149,8 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/raster.inl"
 
+#include "engine/cpu/small_triangles.inl"
+
 #include "engine/cpu/resolve_triangles.inl"
 
 #include "engine/cpu/patches.inl"

@@ -107,7 +107,7 @@ void fillSplat(const FrameConstants& f, const DiscSplat& s, const PixelBox& box,
 template <typename Use>
 [[gnu::always_inline]] inline void forSplats(const FrameConstants& f, const PatchSource& source, const Use& use) {
     const PatchBlock& block = *source.block;
-    alignas(64) int32_t heights[kPatchSamples + 1];
+    alignas(64) int32_t heights[kPatchRoom];
     PlacedCorners p;
     patchHeights(block, heights);
     placeSamples(block, *source.mesh, heights, p);
@@ -121,7 +121,7 @@ template <typename Use>
         }
         return;
     }
-    projectCorners(f, kPatchSamples, p);
+    projectCorners(f, kPatchRoom, p);
     for (uint32_t word = 0; word < 4; ++word)
         for (uint32_t left = block.cells[word]; left != 0; left &= left - 1) {
             const uint32_t cell = 32 * word + static_cast<uint32_t>(__builtin_ctz(left)), at = cellCorner(cell);
