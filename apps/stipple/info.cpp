@@ -16,6 +16,7 @@
 #include "engine/base/units.h"
 #include "engine/base/words.h"
 #include "lod/builder/patch_store/against.h"
+#include "lod/builder/patches/patch_build.h"
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/kinds.h"
 #include "lod/primitives/patch_samples.h"
@@ -103,7 +104,7 @@ nlohmann::json materialInfo(const lod::StoreDescription& d, const lod::Hierarchy
                              {"metallic", m.metallic},
                              {"transmission", m.optics.transmission},
                              {"points", d.points}});
-    if (d.pointMaterials.size() > 1 && h.nodes[0].kind == lod::Kind::patches)  // samples are not counted
+    if (lod::hasPatches(h))  // samples are not counted
         for (nlohmann::json& m : materials) m.erase("points");
     if (const auto index = lod::materialAttribute(d)) {
         for (nlohmann::json& m : materials) m["points"] = 0;
@@ -129,7 +130,7 @@ Result<nlohmann::json> mapInfo(const lod::Store& store) {
     const lod::Hierarchy& h = store.hierarchy;
     std::map<uint32_t, uint64_t> payloads;  // by texels along an edge of a cell
     uint64_t bytes = 0, inMemory = 0;
-    bool hasNormals = false, hasLight = false;
+    bool hasColours = false, hasNormals = false, hasLight = false;
     std::array<uint8_t, lod::kPatchHeadBytes> head{};
     for (uint32_t n = 0; n < h.nodes.size(); ++n) {
         Result<void> read;
@@ -137,6 +138,7 @@ Result<nlohmann::json> mapInfo(const lod::Store& store) {
             const lod::Payload& p = h.payload(chunk);
             if (p.maps == 0 || !read) return;
             ++payloads[1u << (p.maps & shared::kMapDensity)];
+            hasColours = hasColours || (p.maps & shared::kMapDensity) != 0;
             hasNormals = hasNormals || (p.maps & shared::kMapNormals) != 0;
             hasLight = hasLight || (p.maps & shared::kMapLight) != 0;
             inMemory += uint64_t{p.records} * shared::mapWords(p.maps) * sizeof(uint32_t);
@@ -149,11 +151,15 @@ Result<nlohmann::json> mapInfo(const lod::Store& store) {
     if (payloads.empty()) return nlohmann::json();
     nlohmann::json texels = nlohmann::json::object();
     for (const auto& [k, count] : payloads) texels[std::to_string(k)] = count;
-    return nlohmann::json{{"texels", texels},
-                          {"bytes", bytes},
-                          {"bytes_with_mips", inMemory},
-                          {"has_normals", hasNormals},
-                          {"has_light", hasLight}};
+    return nlohmann::json{
+        {"texels", texels},          {"bytes", bytes},       {"bytes_with_mips", inMemory}, {"has_colours", hasColours},
+        {"has_normals", hasNormals}, {"has_light", hasLight}};
+}
+
+/// How far stored normals are off, at most; null: they are as they came, or there are none.
+nlohmann::json normalDegrees(const lod::StoreDescription& d, const lod::Hierarchy& h) {
+    if (!d.hasNormals || h.isGraph || h.isCurves) return nullptr;
+    return lod::hasPatches(h) && lod::hasMirrors(d.pointMaterials) ? 0.03 : 0.12;
 }
 
 /// What is told of a level: of leaves of patches their distance from the source.
@@ -231,7 +237,8 @@ Result<nlohmann::json> storeInfo(const lod::Store& store) {
                           {"crs", d.crs.label()},
                           {"attributes", attributes},
                           {"has_colour", d.hasColour},
-                          {"has_normals", d.hasNormals}};
+                          {"has_normals", d.hasNormals},
+                          {"normal_degrees", normalDegrees(d, h)}};
 }
 
 /// Those that most points have.
@@ -254,10 +261,13 @@ void printMaps(const nlohmann::json& maps) {
     std::string texels;
     for (const auto& [k, count] : maps["texels"].items())
         texels += fmt::format("{}{} in {}", texels.empty() ? "" : ", ", k, counted(count.get<uint64_t>(), "node"));
-    fmt::print("  maps          texels an edge of a cell, at most: {}; colours{}{}; {}, {} in memory with mips\n",
-               texels, maps["has_normals"].get<bool>() ? ", normals" : "",
-               maps["has_light"].get<bool>() ? ", light" : "", humanBytes(maps["bytes"].get<uint64_t>()),
-               humanBytes(maps["bytes_with_mips"].get<uint64_t>()));
+    std::string what;
+    for (const auto& [key, name] :
+         {std::pair{"has_colours", "colours"}, std::pair{"has_normals", "normals to 0.5 degrees"},
+          std::pair{"has_light", "light"}})
+        if (maps[key].get<bool>()) what += fmt::format("{}{}", what.empty() ? "" : ", ", name);
+    fmt::print("  maps          texels an edge of a cell, at most: {}; {}; {}, {} in memory with mips\n", texels, what,
+               humanBytes(maps["bytes"].get<uint64_t>()), humanBytes(maps["bytes_with_mips"].get<uint64_t>()));
 }
 
 void printLevels(const nlohmann::json& j) {
@@ -318,9 +328,10 @@ void printStore(const nlohmann::json& j) {
                    : fmt::format(" (coordinates rounded by at most {:.3g})", rounding.get<double>()));
     fmt::print("  up            {}\n  colour        {}\n  normals       {}\n", vec(j["up"]),
                j["has_colour"].get<bool>() ? "yes" : "no",
-               j["has_normals"].get<bool>()
-                   ? isMesh || j["primitive"] == "segments" ? "yes" : "yes, stored to 0.12 degrees"
-                   : "no");
+               !j["has_normals"].get<bool>() ? "no"
+               : j["normal_degrees"].is_null()
+                   ? "yes"
+                   : fmt::format("yes, stored to {} degrees", j["normal_degrees"].get<double>()));
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
     printMaterials(j["point_materials"]);
     for (const auto& a : j["attributes"])

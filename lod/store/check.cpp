@@ -8,6 +8,7 @@
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/kinds.h"
 #include "lod/store/mesh_place.h"
+#include "shaders/shared/patch_map.h"
 
 namespace stipple::lod {
 
@@ -295,6 +296,21 @@ Result<void> checkPage(const Hierarchy& h, const layout::Places& first, const la
     STIPPLE_TRY(checkTree(h, path, first.nodes, end.nodes, chunksEnd, before));
     if (before.children != end.children || before.runs != end.runs) return bad("the pages of nodes are not possible");
     return overlaps.check(path);
+}
+
+Result<void> checkLight(const Hierarchy& h, uint64_t begin, uint64_t end, uint32_t version, const std::string& path) {
+    if (version == kLightVersion) return {};
+    for (uint64_t i = begin; i < end; ++i) {
+        bool hasLight = false;
+        h.forEachPayload(static_cast<uint32_t>(i), [&](uint32_t chunk) {
+            hasLight = hasLight || (h.payload(chunk).maps & shared::kMapLight) != 0;
+        });
+        if (hasLight)
+            return tl::unexpected(damagedStore(
+                path, fmt::format("node {} claims light of its patches' own, which files before version {} do not have",
+                                  i, kLightVersion)));
+    }
+    return {};
 }
 
 bool isPossibleGroup(const Hierarchy& h, uint32_t chunk) {

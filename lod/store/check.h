@@ -30,6 +30,9 @@ Result<void> checkTables(const Store& store, uint64_t chunksEnd);
 Result<void> checkPage(const Hierarchy& h, const layout::Places& first, const layout::Places& end, uint32_t flags,
                        uint64_t chunksEnd, const std::string& path);
 
+/// Of nodes [begin, end), which are there: light of their own in maps of patches came with kLightVersion.
+Result<void> checkLight(const Hierarchy& h, uint64_t begin, uint64_t end, uint32_t version, const std::string& path);
+
 /// Of a payload of triangles of an octree: is its group? A run is what lies in an octant of the node's cell; textures
 /// and coordinates of more than 30 bits there are none.
 bool isPossibleGroup(const Hierarchy& h, uint32_t chunk);

@@ -116,6 +116,7 @@ Result<std::shared_ptr<NodePages>> NodePages::open(std::shared_ptr<const ByteSou
     STIPPLE_ASSIGN(out->names_, readNames(at, table.kinds, table.codecs, file->path()));
     at += (table.kinds + table.codecs) * sizeof(NameOnDisk);
     out->pages_ = takeArray<PageOnDisk>(at, table.pages);
+    out->version_ = head.version;
     out->isGraph_ = isGraph;
     out->file_ = std::move(file);
     STIPPLE_TRY(out->checkDirectory(head));
@@ -268,6 +269,7 @@ Result<void> NodePages::loadAlone(const Hierarchy& h, uint32_t page) {
         if (h.known.isThere(page)) return {};
         place(part, first);
         STIPPLE_TRY(checkPage(h, first, end, table_.flags, chunksEnd(), file_->path()));
+        STIPPLE_TRY(checkLight(h, first.nodes, end.nodes, version_, file_->path()));
         room_.isThere[page].store(true, std::memory_order_release);
         return {};
     });

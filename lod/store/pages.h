@@ -53,6 +53,7 @@ class NodePages {
     uint32_t pageOfParent(uint64_t node) const;
 
     std::shared_ptr<const ByteSource> file_;
+    uint32_t version_ = 0;  ///< of the file
     bool isGraph_ = false;
     layout::TableHead table_{};
     Names names_;

@@ -300,6 +300,7 @@ Result<Store> openStore(std::shared_ptr<const ByteSource> source, Tables tables)
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
     STIPPLE_TRY(checkTables(store, chunksEnd));
+    if (h.known.isWhole()) STIPPLE_TRY(checkLight(h, 0, h.nodes.size(), head.version, store.path));
     if (!h.groups.empty() && store.description.materials.empty()) {  // it is drawn with a plain one
         shared::SurfaceMaterial& plain = store.description.materials.emplace_back();
         plain.baseColour = {1, 1, 1};

@@ -7,6 +7,7 @@
 #include "lod/builder/patch_store/patch_store_build.h"
 #include "lod/primitives/patch_map.h"
 #include "lod/verify/patches.h"
+#include "tests/support/crafted_store.h"
 #include "tests/support/patch_shapes.h"
 #include "tests/support/triangle_field.h"
 
@@ -122,20 +123,22 @@ TEST(PatchMapStores, EveryLevelKeepsDetailThatNoSampleHas) {
     EXPECT_TRUE(verified) << (verified ? "" : verified.error().line());
 }
 
+/// Left of 1.5 it sends light, right of 2.5 it is lit by none.
+PatchBuildSettings shining(bool isTextured, bool hasLight) {
+    PatchBuildSettings settings = withMaps(isTextured ? 0 : 1);
+    settings.description.pointMaterials = {{}};
+    settings.maps.detail.hasLight = hasLight;
+    settings.looks = [hasLight](uint32_t, const glm::vec2& uv, float) {
+        PlaceLook look{{0.2f, 0.2f, 0.2f}};
+        if (hasLight && uv.x < 1.5f) look.emission = {2, 0.5f, 0};
+        look.isUnlit = hasLight && uv.x > 2.5f;
+        return look;
+    };
+    return settings;
+}
+
 // What shines on the leaves shines on every level; stores without that have not a byte more, nor another version.
 TEST(PatchMapStores, EveryLevelKeepsWhatShines) {
-    const auto shining = [](bool isTextured, bool hasLight) {
-        PatchBuildSettings settings = withMaps(isTextured ? 0 : 1);
-        settings.description.pointMaterials = {{}};
-        settings.maps.detail.hasLight = hasLight;
-        settings.looks = [hasLight](uint32_t, const glm::vec2& uv, float) {
-            PlaceLook look{{0.2f, 0.2f, 0.2f}};
-            if (hasLight && uv.x < 1.5f) look.emission = {2, 0.5f, 0};
-            look.isUnlit = hasLight && uv.x > 2.5f;
-            return look;
-        };
-        return settings;
-    };
     for (const bool isTextured : {true, false}) {
         const Built built = build(sheetOf(0.3), shining(isTextured, true));
         EXPECT_EQ(built.bytes.at(8), kLightVersion);
@@ -174,6 +177,32 @@ TEST(PatchMapStores, EveryLevelKeepsWhatShines) {
         told.maps.detail.hasLight = true;  // some material nobody has
         EXPECT_TRUE(build(sheetOf(0.3), told).bytes == dark.bytes);
     }
+}
+
+// Light came with version 11: a file of before that claims it is damaged, read at once or page by page.
+TEST(PatchMapStores, LightInAnOlderVersionIsRefused) {
+    const test::TempFolder folder;
+    const auto write = [&](const std::string& name, const std::string& bytes) {
+        test::spit(folder / name, bytes);
+        return folder / name;
+    };
+    const Built lit = build(sheetOf(0.3), shining(false, true)), dark = build(sheetOf(0.3), shining(false, false));
+    ASSERT_GT(lit.store.hierarchy.nodes.size(), 2u);
+    Store store = lit.store;
+    store.path = write("lit.stipple", lit.bytes);
+    const std::string paged = test::slurp(test::withPages(store, folder / "paged.stipple", 0));
+    for (const Tables tables : {Tables::whole, Tables::asNeeded})
+        for (const std::string& bytes : {lit.bytes, paged}) {
+            ASSERT_TRUE(openStore(write("11.stipple", test::ofVersion(bytes, kLightVersion)), tables));
+            const std::string path = write("10.stipple", test::ofVersion(bytes, kStoreVersion));
+            const auto older = openStore(path, tables);
+            ASSERT_FALSE(older);
+            EXPECT_EQ(older.error().line(), path +
+                                                ": node 0 claims light of its patches' own, which files before version "
+                                                "11 do not have (the store is damaged or not whole; build it again)");
+        }
+    EXPECT_TRUE(openStore(write("d10.stipple", test::ofVersion(dark.bytes, kStoreVersion))));
+    EXPECT_TRUE(openStore(write("d11.stipple", test::ofVersion(dark.bytes, kLightVersion)))) << "it may, it need not";
 }
 
 TEST(PatchMapStores, AreTheSameForAnyOrderAndThreads) {

@@ -2,6 +2,7 @@
 
 #include <zstd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -41,6 +42,48 @@ Section pack(std::vector<uint8_t>& out, const void* from, size_t count, uint64_t
 }
 
 }  // namespace
+
+namespace {
+
+/// Where streams end.
+uint64_t streamsEnd(const lod::Hierarchy& h) {
+    uint64_t end = sizeof(Head);
+    for (uint32_t n = 0; n < h.nodes.size(); ++n)
+        h.forEachPayload(n, [&](uint32_t chunk) {
+            const lod::Payload& p = h.payload(chunk);
+            end = std::max(end, p.chunkOffset + p.chunkBytes + p.attributeBytes);
+        });
+    for (const lod::Stream& s : h.streams) end = std::max(end, s.offset + s.bytes);
+    for (const lod::TextureTile& t : h.tiles) end = std::max(end, t.offset + t.bytes);
+    return end;
+}
+
+}  // namespace
+
+std::string withPages(const lod::Store& store, const std::string& path, uint32_t log2) {
+    const auto need = [](const auto& result) {
+        if (!result) throw std::runtime_error(result.error().line());
+    };
+    const std::string file = slurp(store.path);
+    auto writer = lod::StoreWriter::create(path);
+    need(writer);
+    const auto end = static_cast<std::ptrdiff_t>(streamsEnd(store.hierarchy));
+    need(writer->appendEncoded({file.begin() + sizeof(Head), file.begin() + end}));
+    need(writer->finish(store.hierarchy, store.description, log2));
+    need(writer->commit());
+    return path;
+}
+
+std::string ofVersion(std::string bytes, uint32_t version) {
+    Head head{};
+    std::memcpy(&head, bytes.data(), sizeof(head));
+    head.version = version;
+    head.hash = hashBytes(&head, offsetof(Head, hash));
+    const Foot foot{head.hash, kFootMagic};
+    std::memcpy(bytes.data(), &head, sizeof(head));
+    std::memcpy(bytes.data() + bytes.size() - sizeof(foot), &foot, sizeof(foot));
+    return bytes;
+}
 
 CraftedStore CraftedStore::read(const std::string& path) {
     const std::string file = slurp(path);

@@ -44,6 +44,11 @@ struct CraftedStore {
     size_t tilesAt() const { return mesh.size() - meshHead().tiles * sizeof(lod::TextureTile); }
 };
 
+/// The same store in a file whose node table has pages of 2^log2 nodes. Gives `path`.
+std::string withPages(const lod::Store& store, const std::string& path, uint32_t log2);
+/// The bytes of a store, told to be of another version; head and foot have their hashes.
+std::string ofVersion(std::string bytes, uint32_t version);
+
 /// A chunk of a store encoded again.
 std::vector<uint8_t> encodeAgain(const lod::Chunk& chunk);
 

@@ -342,6 +342,50 @@ TEST(BuildPatches, MoreSamplesThanThereCanBeAreRefusedByName) {
     EXPECT_FALSE(std::filesystem::exists(folder / "a.stipple"));
 }
 
+/// A bent sheet whose material sends light, as .gltf beside its buffer.
+void writeGlowingSheet(const TempFolder& folder) {
+    const lod::TriangleMesh mesh =
+        test::sheet(20, 20, [](double u, double v) { return glm::dvec3(u, v, 0.2 * u * (1 - u) * v); });
+    std::string bytes;
+    for (const glm::dvec3& p : mesh.position) {
+        const glm::vec3 at(p);
+        bytes.append(reinterpret_cast<const char*>(&at), sizeof(at));
+    }
+    const size_t places = bytes.size();
+    bytes.append(reinterpret_cast<const char*>(mesh.indices.data()), mesh.indices.size() * sizeof(uint32_t));
+    test::spit(folder / "glowing.bin", bytes);
+    nlohmann::json root = nlohmann::json::parse(R"({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "materials": [{"emissiveFactor": [1, 0.5, 0], "pbrMetallicRoughness": {"roughnessFactor": 0.05}}],
+        "buffers": [{"uri": "glowing.bin"}], "bufferViews": [{"buffer": 0}, {"buffer": 0}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
+                      {"bufferView": 1, "componentType": 5125, "type": "SCALAR"}]})");
+    root["buffers"][0]["byteLength"] = bytes.size();
+    root["bufferViews"][0]["byteLength"] = root["bufferViews"][1]["byteOffset"] = places;
+    root["bufferViews"][1]["byteLength"] = bytes.size() - places;
+    root["accessors"][0]["count"] = mesh.position.size();
+    root["accessors"][1]["count"] = mesh.indices.size();
+    test::spit(folder / "glowing.gltf", root.dump());
+}
+
+// `info` says what there is: of a store whose maps hold light alone no colours, and of samples no count of points.
+TEST(BuildPatches, InfoSaysWhatTheirMapsHold) {
+    const TempFolder folder;
+    writeGlowingSheet(folder);
+    const Outcome built = runProgram(folder, "build glowing.gltf --patches -o a.stipple");
+    ASSERT_EQ(built.code, 0) << built.err;
+    const Outcome told = runProgram(folder, "info a.stipple"), asJson = runProgram(folder, "info a.stipple --json");
+    ASSERT_EQ(told.code, 0) << told.err;
+    EXPECT_NE(told.out.find("at most: 1 in 1 node; light; "), std::string::npos) << told.out;
+    EXPECT_EQ(told.out.find("colours"), std::string::npos) << told.out;
+    EXPECT_NE(told.out.find("stored to 0.03 degrees"), std::string::npos) << "of mirrors: " << told.out;
+    EXPECT_NE(told.out.find("roughness 0.05, metallic 1\n"), std::string::npos) << told.out;
+    const auto j = nlohmann::json::parse(asJson.out);
+    EXPECT_FALSE(j["maps"]["has_colours"].get<bool>());
+    EXPECT_TRUE(j["maps"]["has_light"].get<bool>());
+}
+
 /// Creases everywhere: the cap of samples is met by the tightest bound that meets it, and what is left is said.
 TEST(BuildPatches, OfTheHelmetStayAsNearAsTheirSamplesAllow) {
     const std::string helmet = test::dataFile("06_gltf/DamagedHelmet.glb");
@@ -357,7 +401,7 @@ TEST(BuildPatches, OfTheHelmetStayAsNearAsTheirSamplesAllow) {
     EXPECT_LE(j["patches"]["samples"].get<uint64_t>(), 4u * 22'094u);
     EXPECT_EQ(j["maps"]["texels"].dump(), R"({"1":1})") << "the light of its visor alone, of each sample";
     EXPECT_TRUE(j["maps"]["has_light"].get<bool>());
-    EXPECT_FALSE(j["maps"]["has_normals"].get<bool>());
+    EXPECT_FALSE(j["maps"]["has_colours"].get<bool>() || j["maps"]["has_normals"].get<bool>());
     EXPECT_TRUE(j["coordinate_rounding"].is_null()) << "a distance of surfaces is no rounding";
     EXPECT_EQ(j["levels"].back()["largest_error"], j["leaf_distance"]["greatest"]);
 }

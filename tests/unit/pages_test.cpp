@@ -21,6 +21,7 @@ namespace stipple {
 namespace {
 
 using lod::Tables;
+using test::withPages;
 using namespace lod::layout;
 using StorePtr = std::shared_ptr<const lod::Store>;
 
@@ -40,32 +41,6 @@ class CountingSource final : public ByteSource {
   private:
     std::shared_ptr<const ByteSource> of_;
 };
-
-/// Where streams end.
-uint64_t streamsEnd(const lod::Hierarchy& h) {
-    uint64_t end = sizeof(Head);
-    for (uint32_t n = 0; n < h.nodes.size(); ++n)
-        h.forEachPayload(n, [&](uint32_t chunk) {
-            const lod::Payload& p = h.payload(chunk);
-            end = std::max(end, p.chunkOffset + p.chunkBytes + p.attributeBytes);
-        });
-    for (const lod::Stream& s : h.streams) end = std::max(end, s.offset + s.bytes);
-    for (const lod::TextureTile& t : h.tiles) end = std::max(end, t.offset + t.bytes);
-    return end;
-}
-
-/// The same store with pages of 2^log2 nodes.
-std::string withPages(const lod::Store& store, const std::string& path, uint32_t log2) {
-    const std::string file = test::slurp(store.path);
-    auto writer = lod::StoreWriter::create(path);
-    const uint64_t end = streamsEnd(store.hierarchy);
-    EXPECT_TRUE(writer &&
-                writer->appendEncoded({file.begin() + sizeof(Head), file.begin() + static_cast<std::ptrdiff_t>(end)}));
-    const auto done = writer->finish(store.hierarchy, store.description, log2);
-    EXPECT_TRUE(done) << (done ? "" : done.error().line());
-    EXPECT_TRUE(writer->commit());
-    return path;
-}
 
 class StorePages : public testing::Test {
   protected:
