@@ -287,7 +287,7 @@ struct SurfaceRow {
     alignas(64) float ownDepth[kTile];                              ///< before reconstruction; only if wanted
     alignas(64) float coverage[kTile];                              ///< only if hasCoverage
     alignas(64) uint32_t shadow[shared::kMostShadowLights][kTile];  ///< packLight: what comes of lights that cast
-    bool isShadowed[shared::kMostShadowLights];                     ///< else all of it comes to all pixels
+    bool isShadowed[shared::kMostShadowLights];                     ///< else all comes, `shadow` is not filled
     uint32_t shadowSlots;                                           ///< so many of them
     bool hasTriangles, hasEmission, hasCoverage, hasMaterials;
     bool hasOcclusion;  ///< of points, too

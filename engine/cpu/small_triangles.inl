@@ -2,7 +2,8 @@
 // Included by kernels.inl, after raster.inl.
 
 /// Given: corners as they are seen, 1/256 px, and imageLinear. Found: the pixels of those whose boxes are at most kSide
-/// wide and high, and which are left to raster.inl.
+/// wide and high in the picture, and less than kSmallSteps altogether (32 bits hold their products), and which are left
+/// to raster.inl.
 struct SmallTriangles {
     static constexpr size_t kCount = 16;
     static constexpr int kSide = 8;
@@ -28,20 +29,22 @@ struct SmallBoxes {
 [[gnu::always_inline]] inline int mostOf(int a, int b) { return a > b ? a : b; }
 
 SmallBoxes findSmallBoxes(const FrameConstants& f, SmallTriangles& __restrict t) {
-    constexpr int kLast = SmallTriangles::kSide - 1;
+    constexpr int kLast = SmallTriangles::kSide - 1, kMostSteps = int(kSmallSteps) - 1;
     const int right = static_cast<int>(f.width) - 1, bottom = static_cast<int>(f.height) - 1;
     int mostX = -1, mostY = -1;
     uint32_t anyLeft = 0;
 #pragma GCC ivdep
     for (size_t i = 0; i < SmallTriangles::kCount; ++i) {
         const int x0 = t.x[0][i], x1 = t.x[1][i], x2 = t.x[2][i], y0 = t.y[0][i], y1 = t.y[1][i], y2 = t.y[2][i];
+        const int minX = leastOf(leastOf(x0, x1), x2), maxX = mostOf(mostOf(x0, x1), x2);
+        const int minY = leastOf(leastOf(y0, y1), y2), maxY = mostOf(mostOf(y0, y1), y2);
         // First and last pixel whose centre lies in the box, and in the picture.
-        const int fromX = mostOf(0, (leastOf(leastOf(x0, x1), x2) + 127) >> 8);
-        const int fromY = mostOf(0, (leastOf(leastOf(y0, y1), y2) + 127) >> 8);
-        const int spanX = leastOf(right, (mostOf(mostOf(x0, x1), x2) - 128) >> 8) - fromX;
-        const int spanY = leastOf(bottom, (mostOf(mostOf(y0, y1), y2) - 128) >> 8) - fromY;
+        const int fromX = mostOf(0, (minX + 127) >> 8), spanX = leastOf(right, (maxX - 128) >> 8) - fromX;
+        const int fromY = mostOf(0, (minY + 127) >> 8), spanY = leastOf(bottom, (maxY - 128) >> 8) - fromY;
         const uint32_t isEmpty = uint32_t(spanX | spanY) >> 31;
-        const uint32_t isLarge = uint32_t((kLast - spanX) | (kLast - spanY)) >> 31;
+        // (Of the whole triangle too: what reaches far beyond the picture may show but a few pixels of it.)
+        const int roomX = kMostSteps - (maxX - minX), roomY = kMostSteps - (maxY - minY);
+        const uint32_t isLarge = uint32_t((kLast - spanX) | (kLast - spanY) | roomX | roomY) >> 31;
         const uint32_t isClipped = t.isClipped[i] != 0 ? 1u : 0u;
         const uint32_t isLeft = t.isGiven[i] & (isClipped | (isLarge & (isEmpty ^ 1u)));
         const uint32_t isSmall = t.isGiven[i] & ((isClipped | isLarge | isEmpty) ^ 1u);

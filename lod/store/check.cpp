@@ -299,7 +299,7 @@ Result<void> checkPage(const Hierarchy& h, const layout::Places& first, const la
 }
 
 Result<void> checkLight(const Hierarchy& h, uint64_t begin, uint64_t end, uint32_t version, const std::string& path) {
-    if (version == kLightVersion) return {};
+    if (version >= kLightVersion) return {};
     for (uint64_t i = begin; i < end; ++i) {
         bool hasLight = false;
         h.forEachPayload(static_cast<uint32_t>(i), [&](uint32_t chunk) {
