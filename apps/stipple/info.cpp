@@ -159,7 +159,10 @@ Result<nlohmann::json> mapInfo(const lod::Store& store) {
 /// How far stored normals are off, at most; null: they are as they came, or there are none.
 nlohmann::json normalDegrees(const lod::StoreDescription& d, const lod::Hierarchy& h) {
     if (!d.hasNormals || h.isGraph || h.isCurves) return nullptr;
-    return lod::hasPatches(h) && lod::hasMirrors(d.pointMaterials) ? 0.03 : 0.12;
+    bool hasPoints = false;  // whose normals have fewer bits than mirrors of patches
+    for (uint32_t n = 0; n < h.nodes.size(); ++n)
+        h.forEachPayload(n, [&](uint32_t chunk) { hasPoints = hasPoints || kindOf(h, chunk) == lod::Kind::points; });
+    return !hasPoints && lod::hasMirrors(d.pointMaterials) ? 0.03 : 0.12;
 }
 
 /// What is told of a level: of leaves of patches their distance from the source.
