@@ -92,15 +92,33 @@ tl::unexpected<Error> vulkanError(VkResult result, const std::string& what) {
     return fail(kind, fmt::format("{} (VkResult {})", what, static_cast<int>(result)), "Vulkan", "try --device cpu");
 }
 
-Result<void> submitCommands(const Device& device, VkCommandBuffer commands, VkFence fence) {
+Result<void> submitCommands(VkQueue queue, VkCommandBuffer commands, SemaphoreValue after, SemaphoreValue then,
+                            VkFence fence) {
+    const auto infoOf = [](SemaphoreValue at, VkPipelineStageFlags2 stage) {
+        VkSemaphoreSubmitInfo info{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO};
+        info.semaphore = at.semaphore;
+        info.value = at.value;
+        info.stageMask = stage;
+        return info;
+    };
+    const VkSemaphoreSubmitInfo waits = infoOf(after, VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT),
+                                signals = infoOf(then, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT);
     VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
     buffer.commandBuffer = commands;
     VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
     info.commandBufferInfoCount = 1;
     info.pCommandBufferInfos = &buffer;
-    if (const VkResult r = vkQueueSubmit2(device.queue, 1, &info, fence); r != VK_SUCCESS)
+    info.waitSemaphoreInfoCount = after.semaphore != VK_NULL_HANDLE ? 1 : 0;
+    info.pWaitSemaphoreInfos = &waits;
+    info.signalSemaphoreInfoCount = then.semaphore != VK_NULL_HANDLE ? 1 : 0;
+    info.pSignalSemaphoreInfos = &signals;
+    if (const VkResult r = vkQueueSubmit2(queue, 1, &info, fence); r != VK_SUCCESS)
         return vulkanError(r, "cannot submit");
     return {};
+}
+
+Result<void> submitCommands(const Device& device, VkCommandBuffer commands, VkFence fence) {
+    return submitCommands(device.queue, commands, {}, {}, fence);
 }
 
 VkBufferMemoryBarrier2 bufferBarrier(VkBuffer buffer, BufferTouch before, BufferTouch after) {
@@ -149,15 +167,29 @@ std::optional<uint32_t> pickQueueFamily(std::span<const VkQueueFamilyProperties>
     return found;
 }
 
+uint32_t pickCopyFamily(std::span<const VkQueueFamilyProperties> families, uint32_t passes) {
+    constexpr VkQueueFlags kOther = VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT | VK_QUEUE_VIDEO_DECODE_BIT_KHR |
+                                    VK_QUEUE_VIDEO_ENCODE_BIT_KHR | VK_QUEUE_OPTICAL_FLOW_BIT_NV;
+    for (uint32_t i = 0; i < families.size(); ++i)
+        if ((families[i].queueFlags & (kOther | VK_QUEUE_TRANSFER_BIT)) == VK_QUEUE_TRANSFER_BIT &&
+            families[i].queueCount > 0)
+            return i;
+    return passes;
+}
+
 namespace {
 
 /// The logical device, with the features that the passes need.
 Result<VkDevice> createLogicalDevice(const Device& d, const std::vector<const char*>& extensions) {
     const float priority = 1;
-    VkDeviceQueueCreateInfo queueInfo{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
-    queueInfo.queueFamilyIndex = d.queueFamily;
-    queueInfo.queueCount = 1;
-    queueInfo.pQueuePriorities = &priority;
+    std::array<VkDeviceQueueCreateInfo, 2> queueInfos{};
+    for (VkDeviceQueueCreateInfo& queueInfo : queueInfos) {
+        queueInfo.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
+        queueInfo.queueCount = 1;
+        queueInfo.pQueuePriorities = &priority;
+    }
+    queueInfos[0].queueFamilyIndex = d.queueFamily;
+    queueInfos[1].queueFamilyIndex = d.copyFamily;
     VkPhysicalDeviceVulkan13Features v13{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES};
     v13.synchronization2 = VK_TRUE;
     v13.maintenance4 = VK_TRUE;  // glslc writes LocalSizeId
@@ -167,13 +199,14 @@ Result<VkDevice> createLogicalDevice(const Device& d, const std::vector<const ch
     v12.scalarBlockLayout = VK_TRUE;
     v12.shaderBufferInt64Atomics = VK_TRUE;
     v12.hostQueryReset = VK_TRUE;
+    v12.timelineSemaphore = VK_TRUE;
     VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2};
     features.pNext = &v12;
     features.features.shaderInt64 = VK_TRUE;
     VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
     info.pNext = &features;
-    info.queueCreateInfoCount = 1;
-    info.pQueueCreateInfos = &queueInfo;
+    info.queueCreateInfoCount = d.copyFamily != d.queueFamily ? 2 : 1;
+    info.pQueueCreateInfos = queueInfos.data();
     info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
     info.ppEnabledExtensionNames = extensions.data();
     VkDevice device = VK_NULL_HANDLE;
@@ -245,9 +278,12 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
                     d->deviceName, "try --device cpu");
     d->queueFamily = *usable;
     d->hasTimestamps = family[*usable].timestampValidBits > 0;
+    d->copyFamily = pickCopyFamily(family, *usable);
+    d->copiesTellTimes = family[d->copyFamily].timestampValidBits > 0;
 
     STIPPLE_ASSIGN(d->device, createLogicalDevice(*d, settings.deviceExtensions));
     vkGetDeviceQueue(d->device, d->queueFamily, 0, &d->queue);
+    vkGetDeviceQueue(d->device, d->copyFamily, 0, &d->copyQueue);
     return d;
 }
 
@@ -319,13 +355,19 @@ Result<VkDeviceMemory> allocateMemory(const Device& d, const VkMemoryRequirement
 }
 
 Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlags usage, Memory memory,
-                              const std::string& name) {
+                              const std::string& name, Queues queues) {
     Buffer b;
     b.device_ = d.device;
     b.bytes_ = bytes;
     VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
     info.size = bytes;
     info.usage = usage;
+    const std::array families{d.queueFamily, d.copyFamily};
+    if (queues == Queues::passesAndCopies && families[0] != families[1]) {
+        info.sharingMode = VK_SHARING_MODE_CONCURRENT;
+        info.queueFamilyIndexCount = static_cast<uint32_t>(families.size());
+        info.pQueueFamilyIndices = families.data();
+    }
     if (const VkResult r = vkCreateBuffer(d.device, &info, nullptr, &b.buffer_); r != VK_SUCCESS)
         return vulkanError(r, "no buffer " + name);
     VkMemoryRequirements needs{};

@@ -36,6 +36,9 @@ Result<uint64_t> roomFor(const DeviceLimits& limits, uint64_t bytes, VkBufferUsa
 /// The queue family that passes are sent to: compute is all that they need (which can copy, says the specification), a
 /// window also wants graphics. Among those that will do, one that can tell times, then the first.
 std::optional<uint32_t> pickQueueFamily(std::span<const VkQueueFamilyProperties> families, bool forWindow);
+/// The one that chunks are copied with: that of an engine which does nothing but copy, beside what the others do; where
+/// there is none, `passes`, the family of the passes.
+uint32_t pickCopyFamily(std::span<const VkQueueFamilyProperties> families, uint32_t passes);
 
 struct DeviceSettings {
     std::string name;         ///< part of the device's name; empty: the first, real GPUs before software
@@ -54,12 +57,13 @@ class Device {
     VkInstance instance = VK_NULL_HANDLE;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
     VkDevice device = VK_NULL_HANDLE;
-    VkQueue queue = VK_NULL_HANDLE;
-    uint32_t queueFamily = 0;
+    VkQueue queue = VK_NULL_HANDLE, copyQueue = VK_NULL_HANDLE;  ///< may be the same one
+    uint32_t queueFamily = 0, copyFamily = 0;
     std::string deviceName;
     DeviceLimits limits;
     float timestampPeriodNs = 1;
-    bool hasTimestamps = true;  ///< of the queue
+    bool hasTimestamps = true;    ///< of the queue
+    bool copiesTellTimes = true;  ///< likewise
     bool isSoftware = false;
 
     std::vector<std::string> messages() const;
@@ -77,7 +81,16 @@ class Device {
 /// "what: VK_ERROR_..." as a device error.
 tl::unexpected<Error> vulkanError(VkResult result, const std::string& what);
 
-/// Hands recorded commands to the device's queue; `fence` is signalled when they have run.
+/// A value that a timeline semaphore is to have. None: nothing is waited for or told.
+struct SemaphoreValue {
+    VkSemaphore semaphore = VK_NULL_HANDLE;
+    uint64_t value = 0;
+};
+/// Hands recorded commands to a queue: their dispatches wait for `after`; when all has run `then` is set, and `fence`
+/// signalled.
+Result<void> submitCommands(VkQueue queue, VkCommandBuffer commands, SemaphoreValue after, SemaphoreValue then,
+                            VkFence fence);
+/// To the device's queue for passes, at once.
 Result<void> submitCommands(const Device& device, VkCommandBuffer commands, VkFence fence);
 
 /// When a buffer was last used, or is used next.
@@ -104,12 +117,15 @@ enum class Memory : uint8_t {
 Result<VkDeviceMemory> allocateMemory(const Device& device, const VkMemoryRequirements& needs, Memory memory,
                                       bool isAddressed, const std::string& name);
 
+/// Which queues use a buffer.
+enum class Queues : uint8_t { one, passesAndCopies };
+
 class Buffer {
   public:
     Buffer() = default;
     /// Unless it is Memory::device it is mapped for the buffer's life.
     static Result<Buffer> create(const Device& device, uint64_t bytes, VkBufferUsageFlags usage, Memory memory,
-                                 const std::string& name);
+                                 const std::string& name, Queues queues = Queues::one);
     Buffer(Buffer&& o) noexcept { swap(o); }
     Buffer& operator=(Buffer&& o) noexcept {
         swap(o);

@@ -13,6 +13,7 @@ Result<std::unique_ptr<FrameSlot>> FrameSlot::create(const Device& device, Pipel
     STIPPLE_ASSIGN(const VkDescriptorSet set, pipelines.makeSet());
     std::unique_ptr<FrameSlot> slot(new FrameSlot(device, pipelines, set));
     STIPPLE_TRY(slot->createCommandObjects());
+    STIPPLE_ASSIGN(slot->upload_, Upload::create(device));
     return slot;
 }
 
@@ -50,17 +51,16 @@ Result<void> FrameSlot::submit(const render::RenderRequest& request, const Resid
                                uint64_t number) {
     hasPicture_ = false;
     STIPPLE_TRY(buffers_.prepare(request, residents));
-    STIPPLE_TRY(record(request, uploads));
-    STIPPLE_TRY(submitCommands(device_, commands_, fence_));
-    uploads_.clear();
-    std::swap(uploads, uploads_);
+    STIPPLE_TRY(record(request));
+    STIPPLE_TRY(upload_->submit(uploads));
+    STIPPLE_TRY(submitCommands(device_.queue, commands_, upload_->sent(), {}, fence_));
     isInFlight_ = true;
     hasPicture_ = true;
     number_ = number;
     return {};
 }
 
-Result<void> FrameSlot::record(const render::RenderRequest& request, const Staging& uploads) {
+Result<void> FrameSlot::record(const render::RenderRequest& request) {
     VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
     info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS)
@@ -71,11 +71,6 @@ Result<void> FrameSlot::record(const render::RenderRequest& request, const Stagi
     wantsAll_ = request.wantDepthAndNormal;
     if (staysOnDevice_) list.wasCopied(buffers_.at(kImageBinding).handle());  // a window may be about it still
     staysOnDevice_ = request.staysOnDevice;
-    if (!uploads.isEmpty()) {
-        list.beginUpload();
-        uploads.recordCopies(commands_);
-        list.end();
-    }
     STIPPLE_TRY(Recording(list, pipelines_, commands_, buffers_, request).recordPasses());
     if (!staysOnDevice_) recordReadback(list);
     if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS)
@@ -127,6 +122,7 @@ Result<void> FrameSlot::read(render::Image& image, std::vector<render::PassTime>
 void FrameSlot::takeTimes(std::vector<render::PassTime>& times) const {
     std::vector<uint64_t> stamps(labels_.size() * 2);
     times.clear();
+    if (const std::optional<double> ms = upload_->milliseconds()) times.push_back({"upload", *ms});
     if (stamps.empty() ||
         vkGetQueryPoolResults(device_.device, queries_, 0, static_cast<uint32_t>(stamps.size()), stamps.size() * 8,
                               stamps.data(), 8, VK_QUERY_RESULT_64_BIT) != VK_SUCCESS)

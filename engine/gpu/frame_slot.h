@@ -6,7 +6,7 @@
 
 #include "engine/gpu/frame_buffers.h"
 #include "engine/gpu/record.h"
-#include "engine/gpu/staging.h"
+#include "engine/gpu/upload.h"
 
 namespace stipple::gpu {
 
@@ -37,9 +37,9 @@ class FrameSlot {
 
   private:
     FrameSlot(const Device& device, Pipelines& pipelines, VkDescriptorSet set)
-        : device_(device), pipelines_(pipelines), set_(set), buffers_(device, set), uploads_(device) {}
+        : device_(device), pipelines_(pipelines), set_(set), buffers_(device, set) {}
     Result<void> createCommandObjects();
-    Result<void> record(const render::RenderRequest& request, const Staging& uploads);
+    Result<void> record(const render::RenderRequest& request);
     void recordReadback(PassList& list);
     void takeTimes(std::vector<render::PassTime>& times) const;
     void takeImage(render::Image& image) const;
@@ -48,7 +48,7 @@ class FrameSlot {
     Pipelines& pipelines_;
     VkDescriptorSet set_;
     FrameBuffers buffers_;
-    Staging uploads_;  ///< that the frame in flight copies
+    std::unique_ptr<Upload> upload_;  ///< of chunks that the frame is the first to see
     VkCommandPool commandPool_ = VK_NULL_HANDLE;
     VkCommandBuffer commands_ = VK_NULL_HANDLE;
     VkFence fence_ = VK_NULL_HANDLE;

@@ -62,9 +62,10 @@ class GpuBackend final : public render::Backend {
     }
 
     Result<void> upload(streaming::ChunkKey key, lod::Chunk chunk) override {
-        STIPPLE_ASSIGN(const PageStore::Place place, pages_.allocate(chunk.sizeBytes()));
+        if (pages_.hasReleased()) pages_.reclaim(lastDone());
+        STIPPLE_ASSIGN(const PageStore::Place place, allocate(chunk.sizeBytes()));
         if (const auto added = uploads_.add(chunk, pages_.buffer(place), place.offset); !added) {
-            pages_.release(place);
+            pages_.release(place, submitted_);
             return added;
         }
         Resident& resident = residents_.add(key);
@@ -78,7 +79,7 @@ class GpuBackend final : public render::Backend {
     void evict(streaming::ChunkKey key) override {
         residents_.drop(key, [&](const Resident& resident) {
             uploads_.drop(pages_.buffer(resident.place), resident.place.offset);
-            pages_.release(resident.place);
+            pages_.release(resident.place, submitted_);
         });
     }
 
@@ -126,6 +127,21 @@ class GpuBackend final : public render::Backend {
     explicit GpuBackend(std::shared_ptr<Device> device)
         : device_(std::move(device)), pages_(*device_), uploads_(*device_) {}
 
+    /// Where there is no more memory, that of chunks which are gone, once no frame reads them any more.
+    Result<PageStore::Place> allocate(uint64_t bytes) {
+        auto place = pages_.allocate(bytes);
+        if (place || !pages_.hasReleased()) return place;
+        for (const auto& slot : slots_) STIPPLE_TRY(slot->wait());
+        pages_.reclaim(submitted_);
+        return pages_.allocate(bytes);
+    }
+    /// The last frame of those that are done with all before them.
+    uint64_t lastDone() const {
+        uint64_t last = submitted_;
+        for (const auto& slot : slots_)
+            if (!slot->isDone()) last = std::min(last, slot->number() - 1);
+        return last;
+    }
     Result<FrameSlot*> addSlot() {
         STIPPLE_ASSIGN(auto slot, FrameSlot::create(*device_, *pipelines_));
         slots_.push_back(std::move(slot));

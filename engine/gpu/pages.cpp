@@ -50,11 +50,18 @@ Result<PageStore::Place> PageStore::allocate(uint64_t bytes) {
     STIPPLE_ASSIGN(Buffer buffer, Buffer::create(device_, size,
                                                  VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                                                      VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
-                                                 Memory::device, "records page"));
+                                                 Memory::device, "records page", Queues::passesAndCopies));
     pages_.push_back({std::move(buffer), RangeAllocator(size)});
     return Place{static_cast<uint32_t>(pages_.size() - 1), pages_.back().ranges.allocate(bytes), bytes};
 }
 
-void PageStore::release(const Place& place) { pages_[place.page].ranges.release(place.offset, place.bytes); }
+void PageStore::release(const Place& place, uint64_t lastReader) { released_.push_back({place, lastReader}); }
+
+void PageStore::reclaim(uint64_t lastDone) {
+    auto end = released_.begin();
+    for (; end != released_.end() && end->lastReader <= lastDone; ++end)
+        pages_[end->place.page].ranges.release(end->place.offset, end->place.bytes);
+    released_.erase(released_.begin(), end);
+}
 
 }  // namespace stipple::gpu

@@ -33,7 +33,11 @@ class PageStore {
     };
     explicit PageStore(const Device& device) : device_(device) {}
     Result<Place> allocate(uint64_t bytes);
-    void release(const Place& place);
+    /// Not to be written again before frame `lastReader` is done: `reclaim` tells. Never of an earlier one than before.
+    void release(const Place& place, uint64_t lastReader);
+    /// All frames up to this one are done.
+    void reclaim(uint64_t lastDone);
+    bool hasReleased() const { return !released_.empty(); }
     VkBuffer buffer(const Place& p) const { return pages_[p.page].buffer.handle(); }
     VkDeviceAddress address(const Place& p) const { return pages_[p.page].buffer.address() + p.offset; }
 
@@ -42,8 +46,13 @@ class PageStore {
         Buffer buffer;
         RangeAllocator ranges;
     };
+    struct Released {
+        Place place;
+        uint64_t lastReader;
+    };
     const Device& device_;
     std::vector<Page> pages_;
+    std::vector<Released> released_;  ///< still read, perhaps
 };
 
 }  // namespace stipple::gpu

@@ -22,29 +22,10 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
         }
         last_[use.buffer] = {stage, access, use.writes};
     }
-    // Records are read by device address, so their uploads are ordered by one global barrier.
-    VkMemoryBarrier2 memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
-    memory.srcStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
-    memory.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
-    memory.dstStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
-    memory.dstAccessMask = VK_ACCESS_2_SHADER_STORAGE_READ_BIT;
-    const bool readsUploads = uploaded_ && !isTransfer;
-    recordBarriers(commands_, barriers, readsUploads ? &memory : nullptr);
-    if (readsUploads) uploaded_ = false;
+    recordBarriers(commands_, barriers);
     STIPPLE_CHECK(names_.size() < kMaxPasses, "a frame has more passes than it has queries for their times");
     stamp(static_cast<uint32_t>(names_.size()) * 2);
     names_.push_back(name);
-}
-
-void PassList::beginUpload() {
-    VkMemoryBarrier2 memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
-    memory.srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_TRANSFER_BIT;
-    memory.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
-    memory.dstStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
-    memory.dstAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
-    recordBarriers(commands_, {}, &memory);
-    begin("upload", {}, true);
-    uploaded_ = true;
 }
 
 void PassList::wasCopied(VkBuffer buffer) {

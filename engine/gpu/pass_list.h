@@ -21,8 +21,6 @@ class PassList {
     static constexpr uint32_t kMaxPasses = 64;
     PassList(const Device& device, VkCommandBuffer commands, VkQueryPool queries)
         : device_(device), commands_(commands), queries_(queries) {}
-    /// Copies into pages, of which frames before may still read other parts, or those of chunks that are gone.
-    void beginUpload();
     /// Of a buffer that a frame before may still be copied from.
     void wasCopied(VkBuffer buffer);
     /// `isTransfer`: fills and copies instead of a dispatch.
@@ -44,7 +42,6 @@ class PassList {
     VkQueryPool queries_;
     std::map<VkBuffer, Last> last_;
     std::vector<std::string> names_;
-    bool uploaded_ = false;
 };
 
 }  // namespace stipple::gpu

@@ -26,6 +26,20 @@ TEST(Device, AQueueForComputeAloneSufficesWithoutAWindow) {
     EXPECT_EQ(pickQueueFamily(std::array{timeless, computes}, false), 1u);
 }
 
+TEST(Device, ChunksAreCopiedByWhatDoesNothingElseIfThereIsOne) {
+    const auto copies = family(VK_QUEUE_TRANSFER_BIT | VK_QUEUE_SPARSE_BINDING_BIT),
+               video = family(VK_QUEUE_TRANSFER_BIT | VK_QUEUE_VIDEO_DECODE_BIT_KHR),
+               computes = family(VK_QUEUE_COMPUTE_BIT | VK_QUEUE_TRANSFER_BIT),
+               all = family(VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_TRANSFER_BIT);
+    EXPECT_EQ(pickCopyFamily(std::array{all, copies, computes}, 0), 1u);
+    EXPECT_EQ(pickCopyFamily(std::array{all, computes, video, copies}, 1), 3u);
+    EXPECT_EQ(pickCopyFamily(std::array{all, computes, video}, 1), 1u);
+    EXPECT_EQ(pickCopyFamily(std::array{all}, 0), 0u);
+    auto none = copies;
+    none.queueCount = 0;
+    EXPECT_EQ(pickCopyFamily(std::array{none, all}, 1), 1u);
+}
+
 TEST(Device, ABufferBeyondALimitIsRefusedByTheNameOfTheLimit) {
     const DeviceLimits limits{uint64_t{1000} << 20, uint64_t{2000} << 20};
     constexpr VkBufferUsageFlags kBound = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,

@@ -1,10 +1,12 @@
 // Chunks on their way to the device: what is dropped does not get there, what lies there survives that more room is
-// made.
+// made, and nothing is written where a frame in flight may read.
 #include <gtest/gtest.h>
 
 #include <cstring>
 
+#include "engine/gpu/pages.h"
 #include "engine/gpu/staging.h"
+#include "engine/gpu/upload.h"
 #include "tests/gpu/one_time_commands.h"
 
 namespace stipple::gpu {
@@ -63,6 +65,66 @@ TEST(Staging, CopiesWhatWasNotDroppedToItsPlaces) {
     ASSERT_TRUE(staging.add(chunkOf(1, 1), page->handle(), 0));
     staging.drop(page->handle(), 0);
     EXPECT_TRUE(staging.isEmpty());
+    for (const std::string& message : device.messages()) ADD_FAILURE() << message;
+}
+
+TEST(Pages, AreNotWrittenAgainBeforeTheLastFrameThatReadThemIsDone) {
+    const auto made = Device::create({"", true, {}, {}});
+    ASSERT_TRUE(made) << made.error().line();
+    PageStore pages(**made);
+    constexpr uint64_t kHalf = uint64_t{32} << 20;  // of a page
+    const auto first = pages.allocate(kHalf), second = pages.allocate(kHalf);
+    ASSERT_TRUE(first && second);
+    EXPECT_EQ(pages.buffer(*first), pages.buffer(*second));
+    EXPECT_FALSE(pages.hasReleased());
+    pages.release(*first, 4);
+    pages.release(*second, 5);
+    pages.reclaim(3);
+    const auto elsewhere = pages.allocate(kHalf);  // frame 4 may read the first, and frame 5 both
+    ASSERT_TRUE(elsewhere);
+    EXPECT_NE(pages.buffer(*elsewhere), pages.buffer(*first));
+    pages.reclaim(4);
+    const auto again = pages.allocate(kHalf);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(pages.address(*again), pages.address(*first));
+    EXPECT_TRUE(pages.hasReleased());
+    pages.reclaim(5);
+    EXPECT_FALSE(pages.hasReleased());
+    const auto last = pages.allocate(kHalf);
+    ASSERT_TRUE(last);
+    EXPECT_EQ(pages.address(*last), pages.address(*second));
+    for (const std::string& message : (*made)->messages()) ADD_FAILURE() << message;
+}
+
+TEST(Upload, IsThereWhenItsSemaphoreSaysSo) {
+    const auto made = Device::create({"", true, {}, {}});
+    ASSERT_TRUE(made) << made.error().line();
+    const Device& device = **made;
+    constexpr uint64_t kRecords = 50'000, kBytes = kRecords * sizeof(shared::PointRecord);
+    auto host = Buffer::create(device, kBytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::host, "copy");
+    ASSERT_TRUE(host);
+    auto upload = Upload::create(device);
+    ASSERT_TRUE(upload) << upload.error().line();
+    Staging staging(device);
+    ASSERT_TRUE((*upload)->submit(staging));
+    EXPECT_EQ((*upload)->sent().value, 0u) << "nothing to copy";
+    EXPECT_EQ((*upload)->milliseconds(), std::nullopt);
+    for (const uint32_t round : {1u, 2u}) {
+        ASSERT_TRUE(staging.add(chunkOf(kRecords, 10 * round), host->handle(), 0));
+        ASSERT_TRUE((*upload)->submit(staging));
+        EXPECT_TRUE(staging.isEmpty());
+        const SemaphoreValue sent = (*upload)->sent();
+        EXPECT_EQ(sent.value, round);
+        VkSemaphoreWaitInfo wait{VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO};
+        wait.semaphoreCount = 1;
+        wait.pSemaphores = &sent.semaphore;
+        wait.pValues = &sent.value;
+        ASSERT_EQ(vkWaitSemaphores(device.device, &wait, 10'000'000'000), VK_SUCCESS);
+        const auto* const words = static_cast<const uint32_t*>(host->mapped());
+        EXPECT_EQ(words[0], 10 * round);
+        EXPECT_EQ(words[4 * kRecords - 1], 10 * round + 3);
+        EXPECT_EQ((*upload)->milliseconds().has_value(), device.copiesTellTimes);
+    }
     for (const std::string& message : device.messages()) ADD_FAILURE() << message;
 }
 

@@ -1,0 +1,82 @@
+#include "engine/gpu/upload.h"
+
+#include <array>
+
+namespace stipple::gpu {
+
+Result<std::unique_ptr<Upload>> Upload::create(const Device& device) {
+    std::unique_ptr<Upload> upload(new Upload(device));
+    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+    pool.queueFamilyIndex = device.copyFamily;
+    if (const VkResult r = vkCreateCommandPool(device.device, &pool, nullptr, &upload->pool_); r != VK_SUCCESS)
+        return vulkanError(r, "no command pool");
+    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    allocate.commandPool = upload->pool_;
+    allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+    allocate.commandBufferCount = 1;
+    if (const VkResult r = vkAllocateCommandBuffers(device.device, &allocate, &upload->commands_); r != VK_SUCCESS)
+        return vulkanError(r, "no command buffer");
+    VkSemaphoreTypeCreateInfo type{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO};
+    type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
+    VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
+    semaphore.pNext = &type;
+    if (const VkResult r = vkCreateSemaphore(device.device, &semaphore, nullptr, &upload->semaphore_); r != VK_SUCCESS)
+        return vulkanError(r, "no semaphore");
+    if (!device.copiesTellTimes) return upload;
+    VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
+    query.queryType = VK_QUERY_TYPE_TIMESTAMP;
+    query.queryCount = 2;
+    if (const VkResult r = vkCreateQueryPool(device.device, &query, nullptr, &upload->queries_); r != VK_SUCCESS)
+        return vulkanError(r, "no query pool");
+    return upload;
+}
+
+Upload::~Upload() {
+    vkDestroyQueryPool(device_.device, queries_, nullptr);
+    vkDestroySemaphore(device_.device, semaphore_, nullptr);
+    vkDestroyCommandPool(device_.device, pool_, nullptr);
+}
+
+Result<void> Upload::record() {
+    VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+    info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+    if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS)
+        return vulkanError(r, "cannot record");
+    if (queries_ != VK_NULL_HANDLE) {
+        vkResetQueryPool(device_.device, queries_, 0, 2);
+        vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, 0);
+    }
+    // Chunks that are gone were copied to the same places once.
+    VkMemoryBarrier2 memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
+    memory.srcStageMask = memory.dstStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
+    memory.srcAccessMask = memory.dstAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
+    recordBarriers(commands_, {}, &memory);
+    staging_.recordCopies(commands_);
+    if (queries_ != VK_NULL_HANDLE) vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, 1);
+    if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS)
+        return vulkanError(r, "cannot end recording");
+    return {};
+}
+
+Result<void> Upload::submit(Staging& staging) {
+    isOfLastCall_ = !staging.isEmpty();
+    if (staging.isEmpty()) return {};
+    staging_.clear();
+    std::swap(staging, staging_);
+    STIPPLE_TRY(record());
+    STIPPLE_TRY(submitCommands(device_.copyQueue, commands_, {}, {semaphore_, sent_ + 1}, VK_NULL_HANDLE));
+    ++sent_;
+    return {};
+}
+
+std::optional<double> Upload::milliseconds() const {
+    std::array<uint64_t, 2> stamps{};
+    if (!isOfLastCall_ || queries_ == VK_NULL_HANDLE ||
+        vkGetQueryPoolResults(device_.device, queries_, 0, 2, sizeof(stamps), stamps.data(), sizeof(stamps[0]),
+                              VK_QUERY_RESULT_64_BIT) != VK_SUCCESS)
+        return {};
+    return static_cast<double>(stamps[1] - stamps[0]) * static_cast<double>(device_.timestampPeriodNs) * 1e-6;
+}
+
+}  // namespace stipple::gpu
