@@ -168,12 +168,10 @@ std::optional<uint32_t> pickQueueFamily(std::span<const VkQueueFamilyProperties>
 }
 
 uint32_t pickCopyFamily(std::span<const VkQueueFamilyProperties> families, uint32_t passes) {
-    constexpr VkQueueFlags kOther = VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT | VK_QUEUE_VIDEO_DECODE_BIT_KHR |
-                                    VK_QUEUE_VIDEO_ENCODE_BIT_KHR | VK_QUEUE_OPTICAL_FLOW_BIT_NV;
+    // (What else an engine for copies may say of itself. Others of videos or of optical flow copy, too.)
+    constexpr VkQueueFlags kBeside = VK_QUEUE_SPARSE_BINDING_BIT | VK_QUEUE_PROTECTED_BIT;
     for (uint32_t i = 0; i < families.size(); ++i)
-        if ((families[i].queueFlags & (kOther | VK_QUEUE_TRANSFER_BIT)) == VK_QUEUE_TRANSFER_BIT &&
-            families[i].queueCount > 0)
-            return i;
+        if ((families[i].queueFlags & ~kBeside) == VK_QUEUE_TRANSFER_BIT && families[i].queueCount > 0) return i;
     return passes;
 }
 
