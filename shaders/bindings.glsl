@@ -25,7 +25,7 @@ layout(set = 0, binding = kVisibilityBinding, scalar) buffer VisibilityBlock { u
 #define TEXELS  // pull_tail says coherent: its threads read what others of them have written
 #endif
 layout(set = 0, binding = kTexelsBinding, scalar) TEXELS buffer TexelBlock { uint texels[]; };
-layout(set = 0, binding = kStatsBinding, scalar) buffer StatsBlock { uint largestRadiusBits; };
+layout(set = 0, binding = kStatsBinding, scalar) buffer StatsBlock { uint largestRadiusBits; GroupCounts levelGroups[]; };
 layout(set = 0, binding = kImageBinding, scalar) writeonly buffer ImageBlock { uint image[]; };
 layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
 

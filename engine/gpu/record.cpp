@@ -89,7 +89,8 @@ void Recording::dispatch(const std::string& label, const Shader& shader, const s
     if (const auto used = pipelines_.use(commands_, shader); used) {
         if (shader.pushBytes > 0) pipelines_.push(commands_, step);
         if (counts_ != nullptr)
-            vkCmdDispatchIndirect(commands_, counts_->handle(), groups.shape * sizeof(shared::GroupCounts));
+            vkCmdDispatchIndirect(commands_, counts_->handle(),
+                                  firstCounts_ + groups.shape * sizeof(shared::GroupCounts));
         else if (groups.x > 0 && groups.y > 0)
             vkCmdDispatch(commands_, groups.x, groups.y, 1);
     } else if (status_) {
@@ -130,6 +131,14 @@ void Recording::overBands(const std::string& label, const std::string& name, uin
     shared::Step step = stepAt(0);
     step.firstBlock = firstBlock;
     dispatch(label, known(name), step, groupsOfBands());
+}
+
+void Recording::overLevel(const std::string& label, const std::string& name, size_t level, uint32_t ofGroups) {
+    counts_ = &buffers_.at(shared::kStatsBinding);
+    firstCounts_ = sizeof(uint32_t);  // behind the largest radius
+    dispatch(label, known(name), stepAt(level), {ofGroups, 0, 0});
+    counts_ = nullptr;
+    firstCounts_ = 0;
 }
 
 void Recording::once(const std::string& label, const std::string& name, size_t level) {

@@ -38,6 +38,9 @@ class Recording {
     void overBlocks(const std::string& shader, size_t blocks);
     /// Groups for bands of rows: what covers many pixels is shared out. `firstBlock`: of the ids that are drawn.
     void overBands(const std::string& label, const std::string& shader, uint32_t firstBlock = 0);
+    /// One thread a texel, where the device has found (levelGroups) that there are any; the step is from `level` to the
+    /// next.
+    void overLevel(const std::string& label, const std::string& shader, size_t level, uint32_t ofGroups);
     /// One group; the step is from `level` to the next.
     void once(const std::string& label, const std::string& shader, size_t level = 0);
     /// A list of what covers many pixels begins with its length.
@@ -70,6 +73,7 @@ class Recording {
     std::string shader_, label_;
     bool isSmoothing_ = false;
     const Buffer* counts_ = nullptr;  ///< of groups, where dispatches find theirs
+    uint64_t firstCounts_ = 0;        ///< bytes, in that buffer
     Result<void> status_;             ///< the first error
 };
 

@@ -2,12 +2,12 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../bindings.glsl"
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "../shared/pyramid_tail.h"
+layout(local_size_x = kLevelTile, local_size_y = kLevelTile) in;
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= stepInfo.fineWidth || pixel.y >= stepInfo.fineHeight) return;
-    if (stepInfo.level + 1u >= levelCount()) return;
     const Texel own = loadTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, int(pixel.x), int(pixel.y));
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, pushedTexel(ivec2(pixel), own));
 }

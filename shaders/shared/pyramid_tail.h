@@ -1,10 +1,11 @@
-// The coarse end of the pyramid, which one workgroup pulls and pushes: dispatches for so few texels take longer than
-// their work.
+// How the levels of the pyramid are shared out. Its coarse end one workgroup pulls and pushes: dispatches for so few texels
+// take longer than their work.
 #ifndef STIPPLE_SHARED_PYRAMID_TAIL_H
 #define STIPPLE_SHARED_PYRAMID_TAIL_H
 #include "types.h"
 SHARED_BEGIN
 
+const uint kLevelTile = 8u;  // texels along an edge of what one workgroup pulls or pushes of other levels
 const uint kTailTexels = 4096u;  // of its finest level, at most
 const uint kTailLevels = 13u;    // each has half as many texels, or less: 4,096 of one row, 2,048 ... 1
 

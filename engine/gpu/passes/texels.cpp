@@ -26,13 +26,14 @@ size_t firstOfTail(const std::vector<Level>& levels) {
 
 constinit const GpuPass pullPass{[](Recording& f) {
     const size_t tail = firstOfTail(f.buffers().levels());
-    for (size_t l = 0; l < tail; ++l) f.overPixels("pull", "pull", l, l + 1);
+    f.once("levels", "pyramid_levels");
+    for (size_t l = 0; l < tail; ++l) f.overLevel("pull", "pull", l, static_cast<uint32_t>(l) + 1);
     f.once("pull", "pull_tail", tail);
 }};
 
 /// Down to level 1, but for what the tail has pushed: the last push fills the surface buffer.
 constinit const GpuPass pushPass{[](Recording& f) {
-    for (size_t l = firstOfTail(f.buffers().levels()); l-- > 1;) f.overPixels("push", "push", l, l);
+    for (size_t l = firstOfTail(f.buffers().levels()); l-- > 1;) f.overLevel("push", "push", l, shared::kMostLevels + static_cast<uint32_t>(l));
 }};
 
 }  // namespace stipple::gpu
