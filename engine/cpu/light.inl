@@ -8,36 +8,63 @@ struct alignas(64) LitPixels {
     uint32_t words[kTile];
 };
 
+/// Where the planes of n lit pixels are: the row's own where all of it is lit, else closed up. Places beside the
+/// principal point, px.
+struct LitPlanes {
+    const float *x, *y, *depth, *nx, *ny, *nz, *leaf, *red, *green, *blue;
+    const uint32_t* words;
+    size_t n;
+};
+
 /// What the pixels send to the eye.
 struct alignas(64) Sent {
     float r[kTile], g[kTile], b[kTile];
 };
 
-/// Where `mask` says so. (offX, offY): the first pixel's centre, px from the principal point.
-[[gnu::always_inline]] inline size_t takeLit(const SurfaceRow& row, const uint32_t* __restrict mask, float offX,
-                                             float offY, uint32_t pixels, LitPixels& p) {
+template <typename T>
+[[gnu::always_inline]] inline const T* closeUp(const T* __restrict plane, const uint32_t* __restrict at, size_t n,
+                                               T* __restrict closed) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) closed[i] = plane[at[i]];
+    return closed;
+}
+
+/// Where `mask` says so; p.at: which they are. (offX, offY): the first pixel's centre, px from the principal point.
+[[gnu::always_inline]] inline LitPlanes takeLit(const SurfaceRow& row, const uint32_t* __restrict mask, float offX,
+                                                float offY, uint32_t pixels, LitPixels& p) {
     size_t n = 0;
     for (uint32_t i = 0; i < pixels; ++i) {
-        if (mask[i] == 0) continue;
         p.at[n] = i;
-        p.x[n] = row.placeX != nullptr ? row.placeX[i] : offX + float(int(i));
-        p.y[n] = row.placeY != nullptr ? row.placeY[i] : offY;
-        p.depth[n] = row.depth[i];
-        p.nx[n] = row.nx[i];
-        p.ny[n] = row.ny[i];
-        p.nz[n] = row.nz[i];
-        p.leaf[n] = row.leaf[i];
-        p.red[n] = row.red[i];
-        p.green[n] = row.green[i];
-        p.blue[n] = row.blue[i];
-        p.words[n++] = row.material[i];
+        n += mask[i] != 0 ? 1 : 0;
     }
-    return n;
+    float* __restrict const x = p.x;
+    float* __restrict const y = p.y;
+    const uint32_t* __restrict const at = p.at;
+    if (row.placeX == nullptr)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            x[i] = offX + float(int(at[i]));
+            y[i] = offY;
+        }
+    const bool isAll = n == pixels;
+    const auto plane = [&](const auto* from, auto* closed) { return isAll ? from : closeUp(from, at, n, closed); };
+    return {row.placeX != nullptr ? plane(row.placeX, p.x) : p.x,
+            row.placeY != nullptr ? plane(row.placeY, p.y) : p.y,
+            plane(row.depth, p.depth),
+            plane(row.nx, p.nx),
+            plane(row.ny, p.ny),
+            plane(row.nz, p.nz),
+            plane(row.leaf, p.leaf),
+            plane(row.red, p.red),
+            plane(row.green, p.green),
+            plane(row.blue, p.blue),
+            plane(row.material, p.words),
+            n};
 }
 
 /// The surfaces of the pixels; plain pointers, or loops over them do not become SIMD.
 struct LitSurfaces {
-    LitSurfaces(const LitPixels& p, const Lens& of, float inverse)
+    LitSurfaces(const LitPlanes& p, const Lens& of, float inverse)
         : px(p.x),
           py(p.y),
           nx(p.nx),
@@ -143,29 +170,42 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
     const float inverseFocal = 1.0f / f.focal;
     LitPixels p;
     Sent sent;
-    const size_t n = takeLit(row, mask, offX, offY, pixels, p);
-    const LitSurfaces surfaceAt(p, lensHere(f.focal), inverseFocal);
+    const LitPlanes lit = takeLit(row, mask, offX, offY, pixels, p);
+    const size_t n = lit.n;
+    const LitSurfaces surfaceAt(lit, lensHere(f.focal), inverseFocal);
     addSurroundings(f, input, surfaceAt, n, sent.r, sent.g, sent.b);
     for (uint32_t k = 0; k < f.lightCount; ++k) {
         const LightSource& light = input.lights[k];
         const uint32_t shadow = input.shadowSlots != nullptr ? input.shadowSlots[k] : 0;
         if (shadow == 0 || shadow > row.shadowSlots || !row.isShadowed[shadow - 1]) {
-            addLight<false>(light, p.depth, nullptr, surfaceAt, n, sent.r, sent.g, sent.b);
+            addLight<false>(light, lit.depth, nullptr, surfaceAt, n, sent.r, sent.g, sent.b);
             continue;
         }
-        alignas(64) uint32_t past[kTile];
-        for (size_t i = 0; i < n; ++i) past[i] = row.shadow[shadow - 1][p.at[i]];
-        addLight<true>(light, p.depth, past, surfaceAt, n, sent.r, sent.g, sent.b);
+        alignas(64) uint32_t closed[kTile];
+        const uint32_t* const past =
+            n == pixels ? row.shadow[shadow - 1] : closeUp(row.shadow[shadow - 1], p.at, n, closed);
+        addLight<true>(light, lit.depth, past, surfaceAt, n, sent.r, sent.g, sent.b);
+    }
+    if (row.hasEmission)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const uint32_t emission = row.emission[p.at[i]];
+            sent.r[i] += unpackRed(emission);
+            sent.g[i] += unpackGreen(emission);
+            sent.b[i] += unpackBlue(emission);
+        }
+    if (n == pixels) {
+        for (size_t i = 0; i < n; ++i) {
+            row.red[i] = sent.r[i];
+            row.green[i] = sent.g[i];
+            row.blue[i] = sent.b[i];
+        }
+        return;
     }
     for (size_t i = 0; i < n; ++i) {
-        const uint32_t at = p.at[i];
-        row.red[at] = sent.r[i];
-        row.green[at] = sent.g[i];
-        row.blue[at] = sent.b[i];
-        if (!row.hasEmission) continue;
-        row.red[at] += unpackRed(row.emission[at]);
-        row.green[at] += unpackGreen(row.emission[at]);
-        row.blue[at] += unpackBlue(row.emission[at]);
+        row.red[p.at[i]] = sent.r[i];
+        row.green[p.at[i]] = sent.g[i];
+        row.blue[p.at[i]] = sent.b[i];
     }
 }
 

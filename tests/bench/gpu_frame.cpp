@@ -1,15 +1,17 @@
 // What a frame of many records takes on a device, pass by pass, with far more of them resident than any file at hand
 // has: tiles of hilly ground, a node each, whose chunks lie one by one in the device's memory. Of each node the first
-// records are drawn, as a cut draws them. Prints one line of JSON a mode.
+// records are drawn, as a cut draws them. With --replaced so many tiles (1 MiB each) go and come again before each
+// frame. Prints one line of JSON a mode.
 //
 //   stipple_gpu_frame [--resident 10000000] [--drawn 10000000] [--size 1920x1080] [--modes pullpush,splat]
-//                     [--frames 50] [--device NAME] [--picture PREFIX]
+//                     [--frames 50] [--replaced 0] [--device NAME] [--picture PREFIX]
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -37,6 +39,7 @@ struct Options {
     uint32_t width = 1920, height = 1080;
     std::vector<std::string> modes{"pullpush"};
     int frames = 50;
+    uint32_t replaced = 0;  ///< tiles before each frame
     std::string device, picture;
 };
 
@@ -57,6 +60,8 @@ Options optionsOf(int argc, char** argv) {
             for (std::string mode; std::getline(all, mode, ',');) o.modes.push_back(mode);
         } else if (name == "--frames") {
             o.frames = std::stoi(value);
+        } else if (name == "--replaced") {
+            o.replaced = static_cast<uint32_t>(std::stoul(value));
         } else if (name == "--device") {
             o.device = value;
         } else if (name == "--picture") {
@@ -139,8 +144,9 @@ double since(Clock::time_point begin) {
     return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
-/// A few alone, whose passes are told apart; then as many as may be in flight.
-nlohmann::json measure(render::Backend& backend, render::RenderRequest request, int frames) {
+/// A few alone, whose passes are told apart; then as many as may be in flight. `replace` comes before each.
+nlohmann::json measure(render::Backend& backend, render::RenderRequest request, int frames,
+                       const std::function<void()>& replace) {
     std::map<std::string, std::vector<double>> passes;
     std::vector<double> alone, device;
     // Buffers and pipelines are made, and clocks that rest are raised.
@@ -149,6 +155,7 @@ nlohmann::json measure(render::Backend& backend, render::RenderRequest request, 
         valueOf(backend.finish(valueOf(backend.submit(request))));
     for (int f = 0; f < frames; ++f) {
         const Clock::time_point begin = Clock::now();
+        replace();
         valueOf(backend.finish(valueOf(backend.submit(request))));
         alone.push_back(since(begin));
         double sum = 0;
@@ -160,7 +167,10 @@ nlohmann::json measure(render::Backend& backend, render::RenderRequest request, 
     }
     const Clock::time_point begin = Clock::now();
     render::Ticket last;
-    for (int f = 0; f < frames; ++f) last = valueOf(backend.submit(request));
+    for (int f = 0; f < frames; ++f) {
+        replace();
+        last = valueOf(backend.submit(request));
+    }
     valueOf(backend.finish(last));
     nlohmann::json result;
     result["frames"] = frames;
@@ -200,6 +210,15 @@ int run(int argc, char** argv) {
     }
     const double uploaded = since(begin);
 
+    uint32_t next = 0;
+    const auto replace = [&] {
+        for (uint32_t i = 0; i < o.replaced; ++i, next = (next + 1) % tiles) {
+            lod::Chunk chunk;
+            chunk.records = tile;
+            backend->evict({0, next});
+            valueOf(backend->upload({0, next}, std::move(chunk)));
+        }
+    };
     for (const std::string& name : o.modes) {
         const render::Reconstruction* const mode = render::reconstructionNamed(name);
         if (mode == nullptr) throw std::runtime_error("no mode " + name);
@@ -208,7 +227,7 @@ int run(int argc, char** argv) {
         request.mode = mode->mode;
         request.passes = render::passesOf(mode->mode, render::contentOf(list), list.effects);
         request.staysOnDevice = true;
-        nlohmann::json line = measure(*backend, request, o.frames);
+        nlohmann::json line = measure(*backend, request, o.frames, replace);
         const double drawn = static_cast<double>(tiles) * count;
         line["device"] = backend->device();
         line["mode"] = name;
@@ -216,6 +235,7 @@ int run(int argc, char** argv) {
         line["resident"] = uint64_t{tiles} * kOfTile;
         line["drawn"] = drawn;
         line["upload_ms"] = uploaded;
+        line["replaced"] = o.replaced;
         if (line["passes"].contains("project"))
             line["project_gb_per_s"] =
                 1e-6 * drawn * sizeof(shared::PointRecord) / line["passes"]["project"].get<double>();

@@ -11,7 +11,8 @@
 # Each test file is a program of its own there, built as the tree's build folder is, so that ccache has what did not
 # change. Of a formula in a header that half of the tree includes, a mutation names the files that are compiled with it
 # (only=GLOBS): the test itself, where it looks at values, or the kernels of this machine ($kernels), where it draws.
-# All others keep the right formula. Without only=, all that includes the header is compiled anew.
+# All others keep the right formula. Without only=, all that includes the header is compiled anew. (Nothing is precompiled
+# there: a header that was would be there twice.)
 set -u
 tree=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 copy=$tree/build/mutations
@@ -194,6 +195,7 @@ unity=OFF
 grep -qs '^CMAKE_UNITY_BUILD:[A-Z]*=ON' "$tree/build/CMakeCache.txt" && unity=ON
 export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$tree} CCACHE_NOHASHDIR=1
 cmake -S "$copy" -B "$copy/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSTIPPLE_GPU=OFF -DCMAKE_UNITY_BUILD=$unity \
+    -DSTIPPLE_PRECOMPILED=OFF \
     -DSTIPPLE_KERNELS=$set -DCCACHE="$copy/compiler" -DSTIPPLE_SINGLE_TESTS="$(printf '%s\n' "${files[@]}" | sort -u | paste -sd ';')" \
     >"$copy/configure.log" 2>&1 || { echo "the copy is not configured: $copy/configure.log"; exit 1; }
 source "$list"

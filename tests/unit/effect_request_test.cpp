@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <sstream>
 
+#include "engine/render/backdrop.h"
 #include "engine/render/draw_list.h"
 #include "engine/render/effects/request.h"
 #include "engine/render/effects/table.h"
@@ -293,6 +295,44 @@ TEST(EffectsOfTheReadme, AreAllOfTheTableWithWhoCallsForThemCostAndATestThatIsTh
         EXPECT_FALSE(tests.empty()) << row.front();
         for (const std::string& test : tests) EXPECT_TRUE(isThere(test)) << row.front() << test;
     }
+}
+
+TEST(EffectRequests, OptionsOfEffectsThatAreNotInTheProgramAreTakenBackWithANoteEach) {
+    DrawSettings asked;
+    asked.lights.resize(2);
+    asked.lights[0].isSun = asked.lights[0].castsShadow = true;
+    asked.lights[1].castsShadow = true;
+    asked.wind.strength = 3;
+    asked.backdrop = std::make_shared<const Backdrop>();
+    DrawSettings settings = asked;
+    Names notes;
+    takeBack({}, settings, notes);  // as in tests' own builds
+    EXPECT_TRUE(notes.empty());
+    EXPECT_EQ(settings.wind.strength, 3.0f);
+    EXPECT_TRUE(settings.lights[0].castsShadow);
+    EXPECT_NE(settings.backdrop, nullptr);
+
+    constexpr std::array<std::string_view, 4> kAll{"shadow", "wind", "background", "edl"};
+    takeBack(kAll, settings, notes);
+    ASSERT_EQ(notes.size(), 3u);
+    const std::array kOptions{"--sun", "--wind", "--background environment"};
+    for (size_t i = 0; i < kOptions.size(); ++i) {
+        EXPECT_EQ(notes[i].find(kOptions.at(i)), 0u) << notes[i];
+        EXPECT_NE(notes[i].find(kAll.at(i)), std::string::npos) << notes[i];
+        EXPECT_NE(notes[i].find("not compiled into this program"), std::string::npos) << notes[i];
+    }
+    EXPECT_EQ(settings.wind.strength, 0.0f);
+    EXPECT_EQ(settings.backdrop, nullptr);
+    for (const WorldLight& light : settings.lights) EXPECT_FALSE(light.castsShadow);
+
+    notes.clear();  // what was not asked for is no one's loss
+    takeBack(kAll, settings, notes);
+    EXPECT_TRUE(notes.empty());
+    settings = asked;
+    takeBack(std::span(kAll).subspan(1, 1), settings, notes);
+    EXPECT_EQ(notes.size(), 1u);
+    EXPECT_TRUE(settings.lights[0].castsShadow);
+    EXPECT_NE(settings.backdrop, nullptr);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "engine/render/draw_list.h"
 #include "engine/render/effects/table.h"
@@ -36,9 +37,14 @@ constexpr std::array kNamesOfAllBuilds{
 };
 #pragma pop_macro("STIPPLE_ONLY_LIGHT")
 
-bool isLeftOutOfBuild(std::string_view name) {
-    return effectNamed(name) == nullptr &&
-           std::find(kNamesOfAllBuilds.begin(), kNamesOfAllBuilds.end(), name) != kNamesOfAllBuilds.end();
+std::vector<std::string_view> leftOutOfBuild() {
+    std::vector<std::string_view> names;
+    for (const char* name : kNamesOfAllBuilds)
+        if (effectNamed(name) == nullptr) names.emplace_back(name);
+    return names;
+}
+bool has(std::span<const std::string_view> names, std::string_view name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 /// What options of their own ask for, where no manifest is there to say so.
@@ -80,7 +86,7 @@ struct Wanted {
 
 Result<const Effect*> effectIn(const std::string& name) {
     const Effect* const e = effectNamed(name);
-    if (e == nullptr && isLeftOutOfBuild(name))
+    if (e == nullptr && has(leftOutOfBuild(), name))
         return fail(ErrorKind::usage, fmt::format("'{}' is not compiled into this program", name), kOption,
                     "leave it out, or take a build without -DSTIPPLE_EFFECTS=OFF");
     if (e == nullptr)
@@ -264,6 +270,16 @@ Result<void> checkWishes(const EffectWishes& wishes) {
     return checkSettings(wishes, wanted);
 }
 
+void takeBack(std::span<const std::string_view> missing, DrawSettings& settings, std::vector<std::string>& notes) {
+    for (const AskedByOption& asked : kAskedByOptions) {
+        if (!has(missing, asked.name) || !asked.isAsked(settings)) continue;
+        asked.leaveOut(settings);
+        notes.push_back(fmt::format(
+            "{} asks for {}, which is not compiled into this program (-DSTIPPLE_EFFECTS=OFF): pictures are without it",
+            asked.option, asked.name));
+    }
+}
+
 Result<std::vector<std::string>> requestEffects(const EffectWishes& wishes, const SceneWishes& scene,
                                                 const SceneFacts& facts, DrawSettings& settings) {
     STIPPLE_ASSIGN(const Wanted wanted, wantedOf(wishes.list));
@@ -273,13 +289,7 @@ Result<std::vector<std::string>> requestEffects(const EffectWishes& wishes, cons
     settings.parameters = {};
     settings.parameters.facts = facts;
     leaveOut(wishes, wanted, settings, notes);
-    for (const AskedByOption& asked : kAskedByOptions) {
-        if (!isLeftOutOfBuild(asked.name) || !asked.isAsked(settings)) continue;
-        asked.leaveOut(settings);
-        notes.push_back(fmt::format(
-            "{} asks for {}, which is not compiled into this program (-DSTIPPLE_EFFECTS=OFF): pictures are without it",
-            asked.option, asked.name));
-    }
+    takeBack(leftOutOfBuild(), settings, notes);
     for (const Effect* e : wanted.named) {
         if (e->isRequested != nullptr && !e->isRequested(settings))
             return fail(ErrorKind::usage, fmt::format("{} needs {} to say how much", e->name, e->option),

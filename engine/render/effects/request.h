@@ -1,7 +1,9 @@
 // Which effects are asked for: by a person (auto, none, a list), by a scene file, by what the scene is made of.
 #pragma once
 
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/base/result.h"
@@ -31,6 +33,10 @@ Result<void> checkWishes(const EffectWishes& wishes);
 /// person. Errors as above; what a scene file asks in vain is a note.
 Result<std::vector<std::string>> requestEffects(const EffectWishes& wishes, const SceneWishes& scene,
                                                 const SceneFacts& facts, DrawSettings& settings);
+
+/// Of effects that are not in this program (`missing`: their names) what options of their own ask for: taken back, with
+/// a note each. Part of `requestEffects`.
+void takeBack(std::span<const std::string_view> missing, DrawSettings& settings, std::vector<std::string>& notes);
 
 /// For a person: the names that a list may have, with commas.
 std::string effectNames();
