@@ -88,7 +88,7 @@ Result<void> FrameBuffers::preparePlanes(const render::RenderRequest& request) {
     STIPPLE_TRY(ensure(bound_[kVisibilityBinding], gpu::bytesOf(kVisibilityBinding, pixels), kFilled, Memory::device,
                        "visibility"));
     STIPPLE_TRY(ensure(bound_[kTexelsBinding], gpu::bytesOf(kTexelsBinding, words), kFilled, Memory::device, "texels"));
-    STIPPLE_TRY(ensure(bound_[kStatsBinding], gpu::bytesOf(kStatsBinding, 2 * kMostLevels),
+    STIPPLE_TRY(ensure(bound_[kStatsBinding], gpu::bytesOf(kStatsBinding, 2 * kPyramidLevels),
                        kFilled | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, Memory::device, "stats"));
     STIPPLE_TRY(ensure(bound_[kSurfaceBinding], gpu::bytesOf(kSurfaceBinding, pixels), kStorage, Memory::device,
                        "surface buffer"));
