@@ -156,6 +156,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
                                            const std::vector<PlacedGroup>& groups) {
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
+    state->executor = &executor;
     state->backendLife = backend.life();
     state->discSizes = std::make_unique<DiscSizes>(backend);
     state->streamer = std::make_unique<streaming::Streamer>(executor, *state->discSizes, settings);
@@ -270,7 +271,7 @@ Result<uint64_t> drawMetered(FrameState& state, const lod::View& view, const Fra
     plain.staysOnDevice = false;
     takeTone(plain.draw);
     STIPPLE_ASSIGN(const uint64_t passes, drawPlain(state, view, plain));
-    toneImage(settings.draw, view, state.image);
+    toneImage(settings.draw, view, state.image, *state.executor);
     if (!settings.wantDepthAndNormal) {
         state.image.depth.clear();
         state.image.normal.clear();
