@@ -27,7 +27,7 @@ layout(set = 0, binding = kVisibilityBinding, scalar) buffer VisibilityBlock { u
 layout(set = 0, binding = kTexelsBinding, scalar) TEXELS buffer TexelBlock { uint texels[]; };
 layout(set = 0, binding = kStatsBinding, scalar) buffer StatsBlock { uint largestRadiusBits; };
 layout(set = 0, binding = kImageBinding, scalar) writeonly buffer ImageBlock { uint image[]; };
-layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
+layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // kExtraFloats a pixel
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Records { PointRecord records[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RecordWords { uint words[]; };

@@ -48,6 +48,7 @@ struct Frame {
     shared::FrameConstants constants{};
     render::Image* image = nullptr;
     bool wantAll = false;
+    bool isOfCasters = false;   ///< RenderRequest::isOfCasters
     bool hasPyramid = false;    ///< the levels above the first are of this frame: push runs
     bool wantsNormals = false;  ///< some pass reads the surface's
     bool mayHideNodes = false;  ///< RenderRequest::mayHideNodes

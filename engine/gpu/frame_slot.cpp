@@ -69,6 +69,7 @@ Result<void> FrameSlot::record(const render::RenderRequest& request) {
     pipelines_.bind(commands_, set_);
     PassList list(device_, commands_, queries_);
     wantsAll_ = request.wantDepthAndNormal;
+    isOfCasters_ = request.isOfCasters;
     if (staysOnDevice_) list.wasCopied(buffers_.at(kImageBinding).handle());  // a window may be about it still
     staysOnDevice_ = request.staysOnDevice;
     STIPPLE_TRY(Recording(list, pipelines_, commands_, buffers_, request).recordPasses());
@@ -87,7 +88,7 @@ void FrameSlot::recordReadback(PassList& list) {
     VkBufferCopy region{0, 0, bytesOf(kImageBinding, pixels)};
     vkCmdCopyBuffer(commands_, image, to, 1, &region);
     if (wantsAll_) {
-        region = {0, region.size, bytesOf(kExtraBinding, pixels * kExtraFloats)};
+        region = {0, region.size, bytesOf(kExtraBinding, pixels * (isOfCasters_ ? 1 : kExtraFloats))};
         vkCmdCopyBuffer(commands_, extra, to, 1, &region);
     }
     list.end();
@@ -143,16 +144,16 @@ void FrameSlot::takeImage(render::Image& image) const {
     const size_t pixels = size_t{image.width} * image.height;
     image.rgba.resize(pixels);
     std::memcpy(image.rgba.data(), buffers_.readback().mapped(), pixels * 4);
-    image.depth.resize(wantsAll_ ? pixels : 0);
-    image.normal.resize(wantsAll_ ? pixels * 3 : 0);
-    image.linear.resize(wantsAll_ ? pixels * 3 : 0);
-    const auto* extra = reinterpret_cast<const float*>(static_cast<const char*>(buffers_.readback().mapped()) +
-                                                       bytesOf(kImageBinding, pixels));
-    for (size_t i = 0; wantsAll_ && i < pixels; ++i) {
-        image.depth[i] = extra[kExtraFloats * i];
-        std::copy_n(extra + kExtraFloats * i + 1, 3, image.normal.begin() + static_cast<std::ptrdiff_t>(3 * i));
-        std::copy_n(extra + kExtraFloats * i + 4, 3, image.linear.begin() + static_cast<std::ptrdiff_t>(3 * i));
-    }
+    const auto* from = reinterpret_cast<const float*>(static_cast<const char*>(buffers_.readback().mapped()) +
+                                                      bytesOf(kImageBinding, pixels));
+    const auto take = [&](std::vector<float>& plane, bool isThere, size_t floats) {
+        plane.resize(isThere ? floats : 0);
+        if (isThere) std::memcpy(plane.data(), from, floats * sizeof(float));
+        from += floats;
+    };
+    take(image.depth, wantsAll_, pixels);
+    take(image.normal, wantsAll_ && !isOfCasters_, 3 * pixels);
+    take(image.linear, wantsAll_ && !isOfCasters_, 3 * pixels);
 }
 
 }  // namespace stipple::gpu

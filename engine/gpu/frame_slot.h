@@ -55,7 +55,7 @@ class FrameSlot {
     VkQueryPool queries_ = VK_NULL_HANDLE;
     std::vector<std::string> labels_;  ///< of the passes that were recorded
     uint64_t number_ = 0;
-    bool isInFlight_ = false, hasPicture_ = false, wantsAll_ = false, staysOnDevice_ = false;
+    bool isInFlight_ = false, hasPicture_ = false, wantsAll_ = false, isOfCasters_ = false, staysOnDevice_ = false;
 };
 
 }  // namespace stipple::gpu

@@ -34,6 +34,7 @@ struct RenderRequest {
     std::vector<Pass> passes;  ///< of the mode, for what the draw list calls for
     bool wantDepthAndNormal = false;
     /// What a light meets first, drawn before the frame that it lights: depths, and as colours what leaves let through.
+    /// The image has no normals and no linear colours then.
     bool isOfCasters = false;
     /// Points that are hidden behind others need not be drawn, as far as that changes no bit of the picture.
     bool mayHideNodes = false;
