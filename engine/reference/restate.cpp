@@ -49,7 +49,7 @@ double depthAt(const Sample& s, const dvec2& point, const lod::View& view) {
     if (s.isRound) return s.depth;
     const double facing = std::max(std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), 1.0 / 32);
     const dvec3 n = discNormal(s, s.perp, facing, view);
-    const double across = std::max(2 * s.radius, 1 / facing) / view.focalPixels;
+    const double across = std::max(s.radius, 0.5) / view.focalPixels;
     if (view.isOrthographic) {
         const ViewRay ray = viewRay(view, point);
         const double t = glm::dot(n, placeOf(s, s.depth, view) - ray.origin) / n.z;
