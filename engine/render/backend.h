@@ -17,6 +17,7 @@ namespace stipple::render {
 struct PassTime {
     std::string name;
     double ms = 0;
+    bool isBeside = false;  ///< ran beside passes of the frame before: no part of their sum
 };
 
 /// A finished image. Row-major, top row first.

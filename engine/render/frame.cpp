@@ -157,6 +157,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
     state->executor = &executor;
+    state->executorLife = executor.life();
     state->backendLife = backend.life();
     state->discSizes = std::make_unique<DiscSizes>(backend);
     state->streamer = std::make_unique<streaming::Streamer>(executor, *state->discSizes, settings);
@@ -294,9 +295,9 @@ void addTone(const DrawSettings& settings, EffectsOfFrame& shown) {
 
 Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
                      double cutMs) {
-    if (state.backendLife.expired())
+    if (state.backendLife.expired() || state.executorLife.expired())
         return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
-                    "keep the backend while it is used");
+                    "keep the backend and the executor while it is used");
     STIPPLE_TRY(checkFilter(settings.draw));
     uint64_t passes = 0;
     state.effects = {};

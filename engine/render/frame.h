@@ -51,6 +51,7 @@ struct FrameState {
     std::unique_ptr<streaming::Streamer> streamer;   // evicts at its end
     Backend* backend = nullptr;
     Executor* executor = nullptr;
+    std::weak_ptr<const void> executorLife;
     std::weak_ptr<const void> backendLife;
     lod::CutScratch scratch;
     lod::Cut cut;
