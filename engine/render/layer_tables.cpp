@@ -1,8 +1,8 @@
 // What the passes of a layer read: its constants, the picture behind it with its means, its back.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
-#include <mutex>
 
 #include "engine/render/draw_list.h"
 #include "engine/render/layers.h"
@@ -49,7 +49,7 @@ void fillBehind(const Image& image, Executor* executor, LayerTables& t) {
     c.behindDepths = static_cast<uint32_t>(floats);
     t.behind.resize(floats + pixels);
     float* const level0 = t.behind.data();
-    std::mutex mutex;
+    std::atomic<float> most{c.farthest};
     overPixels(executor, pixels, [&](size_t first, size_t end) {
         float farthest = 0;
         for (size_t i = first; i < end; ++i) {
@@ -61,9 +61,10 @@ void fillBehind(const Image& image, Executor* executor, LayerTables& t) {
             farthest = std::max(farthest, image.depth[i]);
             t.behind[c.behindDepths + i] = image.depth[i];
         }
-        const std::lock_guard lock(mutex);
-        c.farthest = std::max(c.farthest, farthest);
+        for (float other = most; farthest > other && !most.compare_exchange_weak(other, farthest);) {
+        }
     });
+    c.farthest = most;
     uint32_t w = image.width, h = image.height;
     for (uint32_t l = 1; l < c.behindLevels; ++l) {
         const float* const from = t.behind.data() + c.behindFirst[l - 1];
