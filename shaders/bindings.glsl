@@ -27,7 +27,7 @@ layout(set = 0, binding = kVisibilityBinding, scalar) buffer VisibilityBlock { u
 layout(set = 0, binding = kTexelsBinding, scalar) TEXELS buffer TexelBlock { uint texels[]; };
 layout(set = 0, binding = kStatsBinding, scalar) buffer StatsBlock { uint largestRadiusBits; GroupCounts levelGroups[]; };
 layout(set = 0, binding = kImageBinding, scalar) writeonly buffer ImageBlock { uint image[]; };
-layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
+layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // planes, see kExtraFloats
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Records { PointRecord records[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RecordWords { uint words[]; };
@@ -118,7 +118,7 @@ vec3 normalAt(Texel t, uvec2 pixel) {
 }
 float depthAt(Texel t, uvec2 pixel) {
     const vec2 at = vec2(pixel) + 0.5 - frame.centre;
-    return planeDepth(t.depth, max(t.radius, 1.0e-3), t.normalPerp, t.offset.x, t.offset.y, t.isRound, at.x, at.y, frameLensHere());
+    return planeDepth(t.depth, max(t.radius, 1.0e-3), t.normalPerp, t.offset.x, t.offset.y, t.isRound, float(stepInfo.hasPyramid | stepInfo.hasSmooth), at.x, at.y, frameLensHere());
 }
 
 void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {

@@ -168,7 +168,7 @@ void drawLegendPanel(const Legend& legend) {
 
 double frameMsOf(const render::FrameState& state) {
     double onDevice = 0;
-    for (const render::PassTime& p : state.backend->passTimes()) onDevice += p.ms;
+    for (const render::PassTime& p : state.backend->passTimes()) onDevice += p.isBeside ? 0 : p.ms;
     return state.onDevice ? std::max(state.counters.frameMs, onDevice) : state.counters.frameMs;
 }
 

@@ -76,6 +76,7 @@ class CpuBackend final : public render::DrawsAtOnce {
         frame_.k = frame_.constants.orthographic != 0 ? *frame_.kernels.orthographic : frame_.kernels;
         frame_.image = &image;
         frame_.wantAll = request.wantDepthAndNormal;
+        frame_.wantsRest = request.wantDepthAndNormal && !request.isOfCasters;
         frame_.hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
         frame_.mayHideNodes = request.mayHideNodes && !request.isOfCasters;

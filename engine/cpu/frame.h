@@ -47,7 +47,8 @@ struct Frame {
     const render::Reconstruction* mode = nullptr;
     shared::FrameConstants constants{};
     render::Image* image = nullptr;
-    bool wantAll = false;
+    bool wantAll = false;       ///< depths are wanted ...
+    bool wantsRest = false;     ///< ... and normals and linear colours
     bool hasPyramid = false;    ///< the levels above the first are of this frame: push runs
     bool wantsNormals = false;  ///< some pass reads the surface's
     bool mayHideNodes = false;  ///< RenderRequest::mayHideNodes

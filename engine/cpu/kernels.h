@@ -294,13 +294,14 @@ struct SurfaceRow {
     bool hasOpacity;    ///< some pixels may be kPixelBlends
     bool hasBehind;     ///< what is not covered shows these, and not one colour
     alignas(64) float behindRed[kTile], behindGreen[kTile], behindBlue[kTile];
-    const float *placeX, *placeY;  ///< px from the principal point; null: where the row is
+    const float *placeX, *placeY;  ///< px from the principal point; both null: where the row is
     const float *mirroredRed, *mirroredGreen,
         *mirroredBlue;  ///< what light adds of the picture's mirror images, or null
 };
 /// What of a surface is needed beyond whether there is one, and its colour.
 struct SurfaceWants {
     bool depth, normal, leaf, ownDepth;
+    bool isMerged;  ///< texels are a pyramid's (planeDepth)
 };
 
 /// Planes of the surface buffer, from a row's first pixel on (effect_room.h).

@@ -40,7 +40,8 @@ template <typename T>
     float* __restrict const x = p.x;
     float* __restrict const y = p.y;
     const uint32_t* __restrict const at = p.at;
-    if (row.placeX == nullptr)
+    const bool isHere = row.placeX == nullptr;
+    if (isHere)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             x[i] = offX + float(int(at[i]));
@@ -48,8 +49,8 @@ template <typename T>
         }
     const bool isAll = n == pixels;
     const auto plane = [&](const auto* from, auto* closed) { return isAll ? from : closeUp(from, at, n, closed); };
-    return {row.placeX != nullptr ? plane(row.placeX, p.x) : p.x,
-            row.placeY != nullptr ? plane(row.placeY, p.y) : p.y,
+    return {isHere ? p.x : plane(row.placeX, p.x),
+            isHere ? p.y : plane(row.placeY, p.y),
             plane(row.depth, p.depth),
             plane(row.nx, p.nx),
             plane(row.ny, p.ny),

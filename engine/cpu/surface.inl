@@ -58,13 +58,14 @@ void surfaceRow(const FrameConstants& frame, const TexelRow& __restrict own, con
     for (size_t i = 0; out.hasEmission && i < n; ++i)
         out.emission[i] = (out.material[i] & kPixelTriangle) != 0 ? planes.emissive[i] : 0u;
     if (wants.normal) surfaceNormals(row, flat, x, py, focal, n, out);
+    const float isMerged = wants.isMerged ? 1.0f : 0.0f;
     if (wants.depth)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const size_t at = kPad + i;
             const float depth =
                 planeDepth(row.depth[at], max(row.radius[at], 1.0e-3f), vec2(row.perpX[at], row.perpY[at]), row.x[at],
-                           row.y[at], 1.0f - flat[i], x + float(int(i)), py, lensHere(focal));
+                           row.y[at], 1.0f - flat[i], isMerged, x + float(int(i)), py, lensHere(focal));
             out.depth[i] = kOrthographic && !(row.depth[at] > 0.0f) ? row.depth[at] : depth;  // nothing stays nothing
         }
     const float mayBeRibbon = row.hasTubes ? 1.0f : 0.0f;

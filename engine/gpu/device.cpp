@@ -101,7 +101,7 @@ Result<void> submitCommands(VkQueue queue, VkCommandBuffer commands, SemaphoreVa
         info.stageMask = stage;
         return info;
     };
-    const VkSemaphoreSubmitInfo waits = infoOf(after, VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT),
+    const VkSemaphoreSubmitInfo waits = infoOf(after, after.stages),
                                 signals = infoOf(then, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT);
     VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
     buffer.commandBuffer = commands;

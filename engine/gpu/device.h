@@ -63,7 +63,7 @@ class Device {
     DeviceLimits limits;
     float timestampPeriodNs = 1;
     bool hasTimestamps = true;    ///< of the queue
-    bool copiesTellTimes = true;  ///< likewise
+    bool copiesTellTimes = true;  ///< of the queue for copies
     bool isSoftware = false;
 
     std::vector<std::string> messages() const;
@@ -85,8 +85,9 @@ tl::unexpected<Error> vulkanError(VkResult result, const std::string& what);
 struct SemaphoreValue {
     VkSemaphore semaphore = VK_NULL_HANDLE;
     uint64_t value = 0;
+    VkPipelineStageFlags2 stages = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;  ///< that wait for it
 };
-/// Hands recorded commands to a queue: their dispatches wait for `after`; when all has run `then` is set, and `fence`
+/// Hands recorded commands to a queue: they wait for `after`; when all has run `then` is set, and `fence`
 /// signalled.
 Result<void> submitCommands(VkQueue queue, VkCommandBuffer commands, SemaphoreValue after, SemaphoreValue then,
                             VkFence fence);

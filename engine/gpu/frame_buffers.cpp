@@ -31,6 +31,10 @@ bool listsDiscs(const render::RenderRequest& request) {
 
 }  // namespace
 
+uint64_t extraFloatsOf(const render::RenderRequest& request) {
+    return !request.wantDepthAndNormal ? 0 : request.isOfCasters ? 1 : kExtraFloats;
+}
+
 /// Grows `buffer` to at least `bytes`; descriptors are written again where it changes.
 Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, Memory memory,
                                   const char* name) {
@@ -75,7 +79,7 @@ Result<void> FrameBuffers::preparePlanes(const render::RenderRequest& request) {
     texelsOfPixels_ = static_cast<uint32_t>(words);
     if (has(request, render::Pass::smooth))
         words += (uint64_t{kTexelWords} + (draws.frame.hasMaterials != 0 ? 1 : 0)) * w * h;
-    const uint64_t pixels = uint64_t{w} * h, extra = request.wantDepthAndNormal ? pixels * kExtraFloats : 0;
+    const uint64_t pixels = uint64_t{w} * h, extra = pixels * extraFloatsOf(request);
     uint64_t nodes = 0;
     for (const render::DrawBatch& batch : draws.batches) nodes += batch.nodes.size();
     const uint64_t blocks = draws.frame.firstBlock.of[kKindDiscs];

@@ -19,6 +19,9 @@ struct Level {
     uint32_t width, height, offset;
 };
 
+/// What a frame leaves of a pixel beside its picture (shared/bindings.h): nothing, a depth, or all.
+uint64_t extraFloatsOf(const render::RenderRequest& request);
+
 /// Where on the device resident chunks are.
 struct Residents {
     std::function<VkDeviceAddress(streaming::ChunkKey key)> addressOf;

@@ -1,6 +1,5 @@
 #include "engine/gpu/frame_slot.h"
 
-#include <algorithm>
 #include <cstring>
 
 namespace stipple::gpu {
@@ -9,11 +8,11 @@ using shared::kExtraBinding;
 using shared::kExtraFloats;
 using shared::kImageBinding;
 
-Result<std::unique_ptr<FrameSlot>> FrameSlot::create(const Device& device, Pipelines& pipelines) {
+Result<std::unique_ptr<FrameSlot>> FrameSlot::create(const Device& device, Pipelines& pipelines, Copies& copies) {
     STIPPLE_ASSIGN(const VkDescriptorSet set, pipelines.makeSet());
-    std::unique_ptr<FrameSlot> slot(new FrameSlot(device, pipelines, set));
+    std::unique_ptr<FrameSlot> slot(new FrameSlot(device, pipelines, copies, set));
     STIPPLE_TRY(slot->createCommandObjects());
-    STIPPLE_ASSIGN(slot->upload_, Upload::create(device));
+    STIPPLE_ASSIGN(slot->upload_, Upload::create(device, copies));
     return slot;
 }
 
@@ -53,7 +52,7 @@ Result<void> FrameSlot::submit(const render::RenderRequest& request, const Resid
     STIPPLE_TRY(buffers_.prepare(request, residents));
     STIPPLE_TRY(record(request));
     STIPPLE_TRY(upload_->submit(uploads));
-    STIPPLE_TRY(submitCommands(device_.queue, commands_, upload_->sent(), {}, fence_));
+    STIPPLE_TRY(submitCommands(device_.queue, commands_, copies_.sent(), {}, fence_));
     isInFlight_ = true;
     hasPicture_ = true;
     number_ = number;
@@ -68,7 +67,7 @@ Result<void> FrameSlot::record(const render::RenderRequest& request) {
     vkResetQueryPool(device_.device, queries_, 0, PassList::kMaxPasses * 2);
     pipelines_.bind(commands_, set_);
     PassList list(device_, commands_, queries_);
-    wantsAll_ = request.wantDepthAndNormal;
+    extraFloats_ = extraFloatsOf(request);
     if (staysOnDevice_) list.wasCopied(buffers_.at(kImageBinding).handle());  // a window may be about it still
     staysOnDevice_ = request.staysOnDevice;
     STIPPLE_TRY(Recording(list, pipelines_, commands_, buffers_, request).recordPasses());
@@ -86,8 +85,8 @@ void FrameSlot::recordReadback(PassList& list) {
     list.begin("readback", {{image, false}, {extra, false}, {to, true}}, true);
     VkBufferCopy region{0, 0, bytesOf(kImageBinding, pixels)};
     vkCmdCopyBuffer(commands_, image, to, 1, &region);
-    if (wantsAll_) {
-        region = {0, region.size, bytesOf(kExtraBinding, pixels * kExtraFloats)};
+    if (extraFloats_ > 0) {
+        region = {0, region.size, bytesOf(kExtraBinding, pixels * extraFloats_)};
         vkCmdCopyBuffer(commands_, extra, to, 1, &region);
     }
     list.end();
@@ -122,7 +121,7 @@ Result<void> FrameSlot::read(render::Image& image, std::vector<render::PassTime>
 void FrameSlot::takeTimes(std::vector<render::PassTime>& times) const {
     std::vector<uint64_t> stamps(labels_.size() * 2);
     times.clear();
-    if (const std::optional<double> ms = upload_->milliseconds()) times.push_back({"upload", *ms});
+    if (const std::optional<double> ms = upload_->milliseconds()) times.push_back({"upload", *ms, true});
     if (stamps.empty() ||
         vkGetQueryPoolResults(device_.device, queries_, 0, static_cast<uint32_t>(stamps.size()), stamps.size() * 8,
                               stamps.data(), 8, VK_QUERY_RESULT_64_BIT) != VK_SUCCESS)
@@ -143,16 +142,16 @@ void FrameSlot::takeImage(render::Image& image) const {
     const size_t pixels = size_t{image.width} * image.height;
     image.rgba.resize(pixels);
     std::memcpy(image.rgba.data(), buffers_.readback().mapped(), pixels * 4);
-    image.depth.resize(wantsAll_ ? pixels : 0);
-    image.normal.resize(wantsAll_ ? pixels * 3 : 0);
-    image.linear.resize(wantsAll_ ? pixels * 3 : 0);
-    const auto* extra = reinterpret_cast<const float*>(static_cast<const char*>(buffers_.readback().mapped()) +
-                                                       bytesOf(kImageBinding, pixels));
-    for (size_t i = 0; wantsAll_ && i < pixels; ++i) {
-        image.depth[i] = extra[kExtraFloats * i];
-        std::copy_n(extra + kExtraFloats * i + 1, 3, image.normal.begin() + static_cast<std::ptrdiff_t>(3 * i));
-        std::copy_n(extra + kExtraFloats * i + 4, 3, image.linear.begin() + static_cast<std::ptrdiff_t>(3 * i));
-    }
+    const auto* from = reinterpret_cast<const float*>(static_cast<const char*>(buffers_.readback().mapped()) +
+                                                      bytesOf(kImageBinding, pixels));
+    const auto take = [&](std::vector<float>& plane, bool isThere, size_t floats) {
+        plane.resize(isThere ? floats : 0);
+        if (isThere) std::memcpy(plane.data(), from, floats * sizeof(float));
+        from += floats;
+    };
+    take(image.depth, extraFloats_ > 0, pixels);
+    take(image.normal, extraFloats_ == kExtraFloats, 3 * pixels);
+    take(image.linear, extraFloats_ == kExtraFloats, 3 * pixels);
 }
 
 }  // namespace stipple::gpu

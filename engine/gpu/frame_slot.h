@@ -12,7 +12,7 @@ namespace stipple::gpu {
 
 class FrameSlot {
   public:
-    static Result<std::unique_ptr<FrameSlot>> create(const Device& device, Pipelines& pipelines);
+    static Result<std::unique_ptr<FrameSlot>> create(const Device& device, Pipelines& pipelines, Copies& copies);
     ~FrameSlot();
     FrameSlot(const FrameSlot&) = delete;
     FrameSlot& operator=(const FrameSlot&) = delete;
@@ -36,8 +36,8 @@ class FrameSlot {
     const FrameBuffers& buffers() const { return buffers_; }
 
   private:
-    FrameSlot(const Device& device, Pipelines& pipelines, VkDescriptorSet set)
-        : device_(device), pipelines_(pipelines), set_(set), buffers_(device, set) {}
+    FrameSlot(const Device& device, Pipelines& pipelines, Copies& copies, VkDescriptorSet set)
+        : device_(device), pipelines_(pipelines), copies_(copies), set_(set), buffers_(device, set) {}
     Result<void> createCommandObjects();
     Result<void> record(const render::RenderRequest& request);
     void recordReadback(PassList& list);
@@ -46,6 +46,7 @@ class FrameSlot {
 
     const Device& device_;
     Pipelines& pipelines_;
+    Copies& copies_;
     VkDescriptorSet set_;
     FrameBuffers buffers_;
     std::unique_ptr<Upload> upload_;  ///< of chunks that the frame is the first to see
@@ -55,7 +56,8 @@ class FrameSlot {
     VkQueryPool queries_ = VK_NULL_HANDLE;
     std::vector<std::string> labels_;  ///< of the passes that were recorded
     uint64_t number_ = 0;
-    bool isInFlight_ = false, hasPicture_ = false, wantsAll_ = false, staysOnDevice_ = false;
+    bool isInFlight_ = false, hasPicture_ = false, staysOnDevice_ = false;
+    uint64_t extraFloats_ = 0;  ///< of a pixel
 };
 
 }  // namespace stipple::gpu

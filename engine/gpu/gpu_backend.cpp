@@ -25,6 +25,7 @@ class GpuBackend final : public render::Backend {
                                                            const std::string& cacheFolder) {
         std::unique_ptr<GpuBackend> b(new GpuBackend(std::move(device)));
         STIPPLE_ASSIGN(b->pipelines_, Pipelines::create(*b->device_, cacheFolder));
+        STIPPLE_ASSIGN(b->copies_, Copies::create(*b->device_));
         STIPPLE_TRY(b->addSlot());
         return b;
     }
@@ -65,7 +66,7 @@ class GpuBackend final : public render::Backend {
         if (pages_.hasReleased()) pages_.reclaim(lastDone());
         STIPPLE_ASSIGN(const PageStore::Place place, allocate(chunk.sizeBytes()));
         if (const auto added = uploads_.add(chunk, pages_.buffer(place), place.offset); !added) {
-            pages_.release(place, submitted_);
+            pages_.free(place);
             return added;
         }
         Resident& resident = residents_.add(key);
@@ -78,8 +79,10 @@ class GpuBackend final : public render::Backend {
     }
     void evict(streaming::ChunkKey key) override {
         residents_.drop(key, [&](const Resident& resident) {
-            uploads_.drop(pages_.buffer(resident.place), resident.place.offset);
-            pages_.release(resident.place, submitted_);
+            if (uploads_.drop(pages_.buffer(resident.place), resident.place.offset))
+                pages_.free(resident.place);  // no frame has seen it
+            else
+                pages_.release(resident.place, submitted_);
         });
     }
 
@@ -143,7 +146,7 @@ class GpuBackend final : public render::Backend {
         return last;
     }
     Result<FrameSlot*> addSlot() {
-        STIPPLE_ASSIGN(auto slot, FrameSlot::create(*device_, *pipelines_));
+        STIPPLE_ASSIGN(auto slot, FrameSlot::create(*device_, *pipelines_, *copies_));
         slots_.push_back(std::move(slot));
         return slots_.back().get();
     }
@@ -168,6 +171,7 @@ class GpuBackend final : public render::Backend {
     PageStore pages_;
     render::ChunkTable<Resident> residents_;
     Staging uploads_;  ///< since the last frame
+    std::unique_ptr<Copies> copies_;
     std::vector<std::unique_ptr<FrameSlot>> slots_;
     std::vector<render::PassTime> times_;
     uint64_t submitted_ = 0;

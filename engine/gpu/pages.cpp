@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "engine/base/check.h"
+
 namespace stipple::gpu {
 namespace {
 constexpr uint64_t kPageBytes = uint64_t{64} << 20, kAlignment = 256;
@@ -55,12 +57,14 @@ Result<PageStore::Place> PageStore::allocate(uint64_t bytes) {
     return Place{static_cast<uint32_t>(pages_.size() - 1), pages_.back().ranges.allocate(bytes), bytes};
 }
 
-void PageStore::release(const Place& place, uint64_t lastReader) { released_.push_back({place, lastReader}); }
+void PageStore::release(const Place& place, uint64_t lastReader) {
+    STIPPLE_CHECK(released_.empty() || released_.back().lastReader <= lastReader, "places are released out of order");
+    released_.push_back({place, lastReader});
+}
 
 void PageStore::reclaim(uint64_t lastDone) {
     auto end = released_.begin();
-    for (; end != released_.end() && end->lastReader <= lastDone; ++end)
-        pages_[end->place.page].ranges.release(end->place.offset, end->place.bytes);
+    for (; end != released_.end() && end->lastReader <= lastDone; ++end) free(end->place);
     released_.erase(released_.begin(), end);
 }
 

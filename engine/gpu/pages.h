@@ -33,6 +33,8 @@ class PageStore {
     };
     explicit PageStore(const Device& device) : device_(device) {}
     Result<Place> allocate(uint64_t bytes);
+    /// Of what no frame reads.
+    void free(const Place& place) { pages_[place.page].ranges.release(place.offset, place.bytes); }
     /// Not to be written again before frame `lastReader` is done: `reclaim` tells. Never of an earlier one than before.
     void release(const Place& place, uint64_t lastReader);
     /// All frames up to this one are done.

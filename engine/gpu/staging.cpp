@@ -31,9 +31,11 @@ Result<void> Staging::add(const lod::Chunk& chunk, VkBuffer page, uint64_t offse
     return {};
 }
 
-void Staging::drop(VkBuffer page, uint64_t offset) {
-    std::erase_if(copies_, [&](const Copy& c) { return c.page == page && c.region.dstOffset == offset; });
+bool Staging::drop(VkBuffer page, uint64_t offset) {
+    const size_t dropped =
+        std::erase_if(copies_, [&](const Copy& c) { return c.page == page && c.region.dstOffset == offset; });
     if (copies_.empty()) used_ = 0;
+    return dropped > 0;
 }
 
 void Staging::recordCopies(VkCommandBuffer commands) const {

@@ -15,8 +15,8 @@ class Staging {
 
     /// Writes all of a chunk that backends draw from, to be copied to `offset` of `page`. Error: no memory for it.
     Result<void> add(const lod::Chunk& chunk, VkBuffer page, uint64_t offset);
-    /// What was to be copied there is not wanted any more.
-    void drop(VkBuffer page, uint64_t offset);
+    /// What was to be copied there is not wanted any more. Was there anything?
+    bool drop(VkBuffer page, uint64_t offset);
     bool isEmpty() const { return copies_.empty(); }
     void recordCopies(VkCommandBuffer commands) const;
     /// The device has copied it all; the memory stays, if it is not much.

@@ -4,8 +4,31 @@
 
 namespace stipple::gpu {
 
-Result<std::unique_ptr<Upload>> Upload::create(const Device& device) {
-    std::unique_ptr<Upload> upload(new Upload(device));
+Result<std::unique_ptr<Copies>> Copies::create(const Device& device) {
+    std::unique_ptr<Copies> copies(new Copies(device));
+    VkSemaphoreTypeCreateInfo type{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO};
+    type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
+    VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
+    semaphore.pNext = &type;
+    if (const VkResult r = vkCreateSemaphore(device.device, &semaphore, nullptr, &copies->semaphore_); r != VK_SUCCESS)
+        return vulkanError(r, "no semaphore");
+    return copies;
+}
+
+Copies::~Copies() { vkDestroySemaphore(device_.device, semaphore_, nullptr); }
+
+Result<void> Copies::waitFor(uint64_t value) const {
+    VkSemaphoreWaitInfo wait{VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO};
+    wait.semaphoreCount = 1;
+    wait.pSemaphores = &semaphore_;
+    wait.pValues = &value;
+    if (const VkResult r = vkWaitSemaphores(device_.device, &wait, ~uint64_t{0}); r != VK_SUCCESS)
+        return vulkanError(r, "the device was lost");
+    return {};
+}
+
+Result<std::unique_ptr<Upload>> Upload::create(const Device& device, Copies& copies) {
+    std::unique_ptr<Upload> upload(new Upload(device, copies));
     VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
     pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
     pool.queueFamilyIndex = device.copyFamily;
@@ -17,12 +40,6 @@ Result<std::unique_ptr<Upload>> Upload::create(const Device& device) {
     allocate.commandBufferCount = 1;
     if (const VkResult r = vkAllocateCommandBuffers(device.device, &allocate, &upload->commands_); r != VK_SUCCESS)
         return vulkanError(r, "no command buffer");
-    VkSemaphoreTypeCreateInfo type{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO};
-    type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
-    VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
-    semaphore.pNext = &type;
-    if (const VkResult r = vkCreateSemaphore(device.device, &semaphore, nullptr, &upload->semaphore_); r != VK_SUCCESS)
-        return vulkanError(r, "no semaphore");
     if (!device.copiesTellTimes) return upload;
     VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
     query.queryType = VK_QUERY_TYPE_TIMESTAMP;
@@ -33,12 +50,12 @@ Result<std::unique_ptr<Upload>> Upload::create(const Device& device) {
 }
 
 Upload::~Upload() {
+    if (last_ > 0) (void)copies_.waitFor(last_);
     vkDestroyQueryPool(device_.device, queries_, nullptr);
-    vkDestroySemaphore(device_.device, semaphore_, nullptr);
     vkDestroyCommandPool(device_.device, pool_, nullptr);
 }
 
-Result<void> Upload::record() {
+Result<void> Upload::record(const Staging& staging) {
     VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
     info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS)
@@ -52,7 +69,7 @@ Result<void> Upload::record() {
     memory.srcStageMask = memory.dstStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
     memory.srcAccessMask = memory.dstAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
     recordBarriers(commands_, {}, &memory);
-    staging_.recordCopies(commands_);
+    staging.recordCopies(commands_);
     if (queries_ != VK_NULL_HANDLE) vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, 1);
     if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS)
         return vulkanError(r, "cannot end recording");
@@ -60,13 +77,16 @@ Result<void> Upload::record() {
 }
 
 Result<void> Upload::submit(Staging& staging) {
-    isOfLastCall_ = !staging.isEmpty();
-    if (staging.isEmpty()) return {};
+    if (last_ > 0) STIPPLE_TRY(copies_.waitFor(last_));  // (Long done, unless the frame that it was for failed.)
     staging_.clear();
+    isOfLastCall_ = false;
+    if (staging.isEmpty()) return {};
+    STIPPLE_TRY(record(staging));
+    STIPPLE_TRY(submitCommands(device_.copyQueue, commands_, {}, copies_.next(), VK_NULL_HANDLE));
+    copies_.count();
+    last_ = copies_.sent().value;
     std::swap(staging, staging_);
-    STIPPLE_TRY(record());
-    STIPPLE_TRY(submitCommands(device_.copyQueue, commands_, {}, {semaphore_, sent_ + 1}, VK_NULL_HANDLE));
-    ++sent_;
+    isOfLastCall_ = true;
     return {};
 }
 

@@ -49,7 +49,9 @@ double depthAt(const Sample& s, const dvec2& point, const lod::View& view) {
     if (s.isRound) return s.depth;
     const double facing = std::max(std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), 1.0 / 32);
     const dvec3 n = discNormal(s, s.perp, facing, view);
-    const double across = std::max(2 * s.radius, 1 / facing) / view.focalPixels;
+    // (What stands alone ends at its rim.)
+    const double across =
+        (s.isMerged ? std::max(2 * s.radius, 1 / facing) : std::max(s.radius, 0.5)) / view.focalPixels;
     if (view.isOrthographic) {
         const ViewRay ray = viewRay(view, point);
         const double t = glm::dot(n, placeOf(s, s.depth, view) - ray.origin) / n.z;
@@ -354,6 +356,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         for (size_t l = pyramid.size() - 1; l-- > 0;)
             pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), view, variation_.kernel);
         level0 = std::move(pyramid[0]);
+        for (Sample& s : level0.samples) s.isMerged = true;
     }
 
     void shade(const render::DrawList& draws, const Level& own, const Level& level, bool wantAll,
@@ -412,6 +415,8 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         image.height = v.height;
         image.rgba.assign(level.samples.size(), 0);
         image.depth.assign(level.samples.size(), 0.0f);
+        image.normal.clear();
+        image.linear.clear();
         for (size_t i = 0; i < level.samples.size(); ++i) {
             const Sample& s = level.samples[i];
             if (!s.valid) continue;

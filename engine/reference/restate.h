@@ -25,6 +25,7 @@ struct Sample {
     // Of a tube: `perp` is t_v t_perp, with t its unit tangent, `axis` (tx^2 - ty^2, 2 tx ty).
     bool isRound = false;
     glm::dvec2 axis{0};
+    bool isMerged = false;  ///< of a pyramid
     bool isSmooth = false;  ///< of a disc exactly, which is wider than a few pixels
     // Of a triangle's pixel:
     bool isTriangle = false, isUnlit = false;

@@ -17,6 +17,7 @@ namespace stipple::render {
 struct PassTime {
     std::string name;
     double ms = 0;
+    bool isBeside = false;  ///< ran beside passes of the frame before: no part of their sum
 };
 
 /// A finished image. Row-major, top row first.
@@ -34,6 +35,7 @@ struct RenderRequest {
     std::vector<Pass> passes;  ///< of the mode, for what the draw list calls for
     bool wantDepthAndNormal = false;
     /// What a light meets first, drawn before the frame that it lights: depths, and as colours what leaves let through.
+    /// The image has no normals and no linear colours then.
     bool isOfCasters = false;
     /// Points that are hidden behind others need not be drawn, as far as that changes no bit of the picture.
     bool mayHideNodes = false;

@@ -156,6 +156,8 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
                                            const std::vector<PlacedGroup>& groups) {
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
+    state->executor = &executor;
+    state->executorLife = executor.life();
     state->backendLife = backend.life();
     state->discSizes = std::make_unique<DiscSizes>(backend);
     state->streamer = std::make_unique<streaming::Streamer>(executor, *state->discSizes, settings);
@@ -270,7 +272,7 @@ Result<uint64_t> drawMetered(FrameState& state, const lod::View& view, const Fra
     plain.staysOnDevice = false;
     takeTone(plain.draw);
     STIPPLE_ASSIGN(const uint64_t passes, drawPlain(state, view, plain));
-    toneImage(settings.draw, view, state.image);
+    toneImage(settings.draw, view, state.image, *state.executor);
     if (!settings.wantDepthAndNormal) {
         state.image.depth.clear();
         state.image.normal.clear();
@@ -293,9 +295,9 @@ void addTone(const DrawSettings& settings, EffectsOfFrame& shown) {
 
 Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
                      double cutMs) {
-    if (state.backendLife.expired())
+    if (state.backendLife.expired() || state.executorLife.expired())
         return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
-                    "keep the backend while it is used");
+                    "keep the backend and the executor while it is used");
     STIPPLE_TRY(checkFilter(settings.draw));
     uint64_t passes = 0;
     state.effects = {};

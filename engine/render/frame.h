@@ -50,6 +50,8 @@ struct FrameState {
     std::unique_ptr<DiscSizes> discSizes;            ///< between streamer and backend
     std::unique_ptr<streaming::Streamer> streamer;   // evicts at its end
     Backend* backend = nullptr;
+    Executor* executor = nullptr;
+    std::weak_ptr<const void> executorLife;
     std::weak_ptr<const void> backendLife;
     lod::CutScratch scratch;
     lod::Cut cut;

@@ -93,6 +93,7 @@ LayerInput inputOf(const FrameState& state, const LayerDraw& layer, const DrawSe
     const Body body = bodyIn(state, nearest);
     const lod::Instance& placed = state.instances[nearest];
     LayerInput in;
+    in.executor = state.executor;
     in.way = draw.refract == shared::kRefractObject && !layer.isSeenTwice ? shared::kRefractScreen : draw.refract;
     for (const lod::Optics& o : a.optics) in.optics.push_back(inWorld(o, placed.scale, body));
     in.pointOptic = a.hierarchies[placed.hierarchy].points;
@@ -171,10 +172,10 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
         const NoLayerAfter noLayerAfter(state.draws);
         STIPPLE_ASSIGN(const uint64_t more, drawNodes(state, l.cut, view, lit));
         passes += more;
-        putLayer(state.image, settings.draw.background, layer.opacity, l.behind);
+        putLayer(state.image, settings.draw.background, layer.opacity, l.behind, *state.executor);
     }
     std::swap(state.image, l.behind);
-    if (hasTone) toneImage(settings.draw, view, state.image);
+    if (hasTone) toneImage(settings.draw, view, state.image, *state.executor);
     if (!settings.wantDepthAndNormal) {
         state.image.depth.clear();
         state.image.normal.clear();

@@ -16,6 +16,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/base/executor.h"
 #include "engine/render/backend.h"
 #include "lod/store/store.h"
 #include "shaders/shared/optics.h"
@@ -45,6 +46,7 @@ struct LayerInput {
     lod::View backView;
     glm::dvec3 bodyCentre{0};
     double bodyRadius = 0;
+    Executor* executor = nullptr;  ///< what the tables of its pixels are made on; null: the calling thread
 };
 
 /// The same for shaders.
@@ -115,7 +117,7 @@ lod::View viewFromBehind(const Body& body, const lod::View& view);
 /// The layer over the picture of what is behind it, into `behind`: the layer's coverage counts, times `opacity`. Where
 /// both are there the nearer is seen; depth and normal stay those behind where less than half of the layer is seen.
 /// `background`: linear, of both.
-void putLayer(const Image& layer, const glm::vec3& background, float opacity, Image& behind);
+void putLayer(const Image& layer, const glm::vec3& background, float opacity, Image& behind, Executor& executor);
 
 /// White, rough, without textures: a mesh that says nothing of its material.
 bool isPlainMesh(const lod::StoreDescription& description);

@@ -54,14 +54,14 @@ double meteredExposure(const Image& image, const Behind& behind) {
     return weights > 0 ? std::clamp(kGrey / std::exp2(logarithms / weights), kLeast, 1 / kLeast) : 1;
 }
 
-void toneImage(const DrawSettings& settings, const lod::View& view, Image& image) {
+void toneImage(const DrawSettings& settings, const lod::View& view, Image& image, Executor& executor) {
     const ToneSettings& asked = settings.parameters.tone;
     const Behind behind(settings, view);
     const double metered = asked.metering != 0 ? meteredExposure(image, behind) : 1;
     const shared::ToneConstants tone{static_cast<float>(asked.exposure * metered), asked.curve != 0 ? 1u : 0u};
-    for (size_t i = 0; i < image.rgba.size(); ++i) {
+    const auto tonePixel = [&](size_t i) {
         const float share = coverOf(image, i);
-        if (!(share > 0) && !behind.isBackdrop()) continue;
+        if (!(share > 0) && !behind.isBackdrop()) return;
         const glm::vec3 beyond = share < 1 ? behind.at(i) : glm::vec3(0);
         uint32_t bytes = image.rgba[i] & 0xff000000u;
         for (size_t c = 0; c < 3; ++c) {
@@ -73,7 +73,10 @@ void toneImage(const DrawSettings& settings, const lod::View& view, Image& image
                      << (8 * c);
         }
         image.rgba[i] = bytes;
-    }
+    };
+    executor.parallelFor(image.rgba.size(), size_t{1} << 14, [&](size_t first, size_t end) {
+        for (size_t i = first; i < end; ++i) tonePixel(i);
+    });
 }
 
 }  // namespace stipple::render

@@ -22,6 +22,6 @@ double meteredExposure(const Image& image, const Behind& behind);
 
 /// Tone as `settings` ask for it, on what of the picture is covered, and on an environment's picture behind it; the
 /// picture has its linear colours. `view`: what it shows.
-void toneImage(const DrawSettings& settings, const lod::View& view, Image& image);
+void toneImage(const DrawSettings& settings, const lod::View& view, Image& image, Executor& executor);
 
 }  // namespace stipple::render

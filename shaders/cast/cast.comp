@@ -12,5 +12,5 @@ void main() {
     const bool isMet = s.depth > 0.0;
     const bool isLeaf = isMet && (s.material & kPixelLeaf) != 0u;
     image[at] = isLeaf ? throughLeaf(vec3(unpackRed(s.albedo), unpackGreen(s.albedo), unpackBlue(s.albedo))) : 0u;
-    extra[kExtraFloats * at] = isMet ? s.depth : 0.0;
+    extra[at] = isMet ? s.depth : 0.0;
 }

@@ -105,11 +105,12 @@ void main() {
     image[at] = bytes.x | bytes.y << 8 | bytes.z << 16 | uint(share * 255.0 + 0.5) << 24;
     if (stepInfo.wantExtra == 0u) return;
     const vec3 world = isMet ? frame.viewX * n.x + frame.viewY * n.y + frame.viewZ * n.z : vec3(0.0);
-    extra[7u * at] = isMet ? s.depth : 0.0;
-    extra[7u * at + 1u] = world.x;
-    extra[7u * at + 2u] = world.y;
-    extra[7u * at + 3u] = world.z;
-    extra[7u * at + 4u] = colour.x;
-    extra[7u * at + 5u] = colour.y;
-    extra[7u * at + 6u] = colour.z;
+    const uint pixels = frame.width * frame.height, normals = pixels + 3u * at, linears = 4u * pixels + 3u * at;
+    extra[at] = isMet ? s.depth : 0.0;
+    extra[normals] = world.x;
+    extra[normals + 1u] = world.y;
+    extra[normals + 2u] = world.z;
+    extra[linears] = colour.x;
+    extra[linears + 1u] = colour.y;
+    extra[linears + 2u] = colour.z;
 }

@@ -48,7 +48,7 @@ const uint kBindings = 39u;
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more
 const uint kTriangleWords = 2u;  // material, emission
-const uint kExtraFloats = 7u;    // depth, normal xyz, linear rgb
+const uint kExtraFloats = 7u;    // in planes: depths, normals xyz, linear rgb (of casters only the first)
 
 // Lists of what covers so many pixels that all threads fill it, and how: each workgroup a band of rows.
 const uint kLargeCapacity = 65536u;  // triangles

@@ -110,15 +110,18 @@ SHARED_FN float discRho2(vec2 slope, float radius, float placeX, float placeY, L
 }
 
 // Depth of the texel's plane at the texel's own centre (a tube: its own). Planes that face the eye by less than
-// kGrazing count as if they did by that; and no farther from the centre's depth than a disc twice as large reaches (or
-// one that is a pixel wide where it is seen edge-on).
+// kGrazing count as if they did by that. How far from the centre's depth it may be: of a pyramid's texels, which stand
+// for a surface that goes on beside them, what a disc twice as large reaches (or one that is a pixel wide where it is
+// seen edge-on); of points that stand alone (`isMerged` is 0) what the disc reaches, or one of half a pixel. Beyond its
+// rim the surface may be anywhere, and a plane that is seen nearly edge-on runs away from it.
 const float kGrazing = 0.03125f;
 SHARED_FN float planeDepth(float depth, float radius, vec2 normalPerp, float offsetX, float offsetY, float isRound,
-                           float x, float y, Lens lens) {
+                           float isMerged, float x, float y, Lens lens) {
     const float sine2 = normalPerp.x * normalPerp.x + normalPerp.y * normalPerp.y;
     const float facing = max(sqrt(max(1.0f - sine2, 0.0f)), kGrazing);
     const vec2 s = planeSlope(normalPerp, 1.0f / facing, x + offsetX, y + offsetY, lens);
-    const float reach = min(max(2.0f * radius, 1.0f / facing) / lens.focal, lens.isOrthographic ? 3.0e38f : 0.5f);
+    const float beside = isMerged > 0.5f ? max(2.0f * radius, 1.0f / facing) : max(radius, 0.5f);
+    const float reach = min(beside / lens.focal, lens.isOrthographic ? 3.0e38f : 0.5f);
     const float along = -(s.x * offsetX + s.y * offsetY);
     const float flat_ = 1.0f - isRound;
     const float nearer = flat_ * min(max(along, -reach), reach);

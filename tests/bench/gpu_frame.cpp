@@ -161,7 +161,7 @@ nlohmann::json measure(render::Backend& backend, render::RenderRequest request, 
         double sum = 0;
         for (const render::PassTime& t : backend.passTimes()) {
             passes[t.name].push_back(t.ms);
-            sum += t.ms;
+            sum += t.isBeside ? 0 : t.ms;
         }
         device.push_back(sum);
     }

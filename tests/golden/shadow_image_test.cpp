@@ -208,6 +208,32 @@ TEST_F(ShadowPictures, SurviveLightsThatCannotBeMeant) {
     EXPECT_TRUE(isFinite(state->image));
 }
 
+TEST_F(ShadowPictures, MapsAreDrawnAsDepthsAlone) {
+    test::writePly(folder_ / "a.ply", floorAndBall(), true, true);
+    const auto store = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_);
+    const auto state = drawn(store, usual(), *executor_, viewOf(), under(sun()));
+    const auto expectDepthsAlone = [&] {
+        const render::Image& map = state->shadows->image;
+        const size_t texels = size_t{map.width} * map.height;
+        ASSERT_GT(texels, 0u);
+        EXPECT_EQ(map.depth.size(), texels);
+        EXPECT_EQ(map.rgba.size(), texels);
+        EXPECT_TRUE(map.normal.empty());
+        EXPECT_TRUE(map.linear.empty());
+        const auto isNothing = [](float depth) { return depth == 0; };
+        const auto nothing = std::count_if(map.depth.begin(), map.depth.end(), isNothing);
+        EXPECT_GT(nothing, 0) << "beside the scene";
+        EXPECT_LT(nothing, static_cast<std::ptrdiff_t>(texels));
+    };
+    expectDepthsAlone();
+    // Into an image that was another's.
+    state->shadows->image.normal.assign(7, 1.0f);
+    state->shadows->image.linear.assign(7, 1.0f);
+    state->shadows->kept.clear();
+    ASSERT_TRUE(render::renderUntilComplete(*state, viewOf(), under(sun())));
+    expectDepthsAlone();
+}
+
 TEST_F(ShadowPictures, BecomeCoarserFirstWhereTheBudgetIsSmall) {
     test::writePly(folder_ / "a.ply", floorAndBall(), true, true);
     const auto store = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_);

@@ -83,5 +83,50 @@ TEST(OnDevice, PicturesAreTheSameAndAreNotCopied) {
     for (const std::string& message : device->messages()) ADD_FAILURE() << message;
 }
 
+// Two views that have no room beside each other: what one lets go the other is copied over, while frames of both are on
+// their way. (On a card with an engine for copies beside them.)
+TEST(OnDevice, WhatComesAndGoesLeavesFramesInFlightAlone) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::bumpySphere(120'000, 1));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 512);
+    auto made = Device::create({"", true, {}, {}});
+    ASSERT_TRUE(made);
+    const std::shared_ptr<Device> device = std::move(*made);
+    auto backend = makeGpuBackendOn(device);
+    ASSERT_TRUE(backend);
+    render::Backend& gpu = **backend;
+    lod::View views[2] = {test::fitView(*store, 240, 180), test::fitView(*store, 240, 180)};
+    for (lod::View& v : views) v.focalPixels *= 5;
+    views[0].eye += 0.25 * views[0].right;
+    views[1].eye -= 0.25 * views[1].right;
+    render::FrameSettings stays;
+    stays.budgets.errorPixels = 0.5;
+    render::FrameSettings isRead = stays;
+    stays.staysOnDevice = true;
+    uint64_t most = 0;
+    std::vector<uint32_t> expected[2];
+    for (size_t v = 0; v < 2; ++v) {
+        auto alone = render::makeFrameState({store}, gpu, *executor, {});
+        ASSERT_TRUE(render::renderUntilComplete(*alone, views[v], isRead).value_or(false));
+        expected[v] = alone->image.rgba;
+        most = std::max(most, alone->streamer->counters().residentBytes);
+    }
+    streaming::StreamSettings tight;
+    tight.residentBytes = most + most / 8;
+    auto state = render::makeFrameState({store}, gpu, *executor, tight);
+    for (size_t turn = 0; turn < 16; ++turn) {
+        const size_t v = turn % 2;
+        // Frames of what is there, one after another, before the last is waited for.
+        for (int k = 0; k < 3; ++k) ASSERT_TRUE(render::renderFrame(*state, views[v], stays));
+        ASSERT_TRUE(render::renderUntilComplete(*state, views[v], stays).value_or(false));
+        const auto picture = pictureOf(gpu, *state->onDevice);
+        ASSERT_TRUE(picture);
+        EXPECT_TRUE(copied(*picture) == expected[v]) << turn;
+    }
+    EXPECT_GT(state->streamer->counters().evictions, 30u);
+    for (const std::string& message : device->messages()) ADD_FAILURE() << message;
+}
+
 }  // namespace
 }  // namespace stipple::gpu

@@ -27,10 +27,10 @@ class OneTimeCommands {
 
     VkCommandBuffer handle() const { return commands_; }
     void end() { EXPECT_EQ(vkEndCommandBuffer(commands_), VK_SUCCESS); }
-    /// Ends recording; has run when it returns.
-    void run() {
+    /// Ends recording; has run when it returns. It waits for `after`.
+    void run(const SemaphoreValue& after = {}) {
         end();
-        EXPECT_TRUE(submitCommands(device_, commands_, VK_NULL_HANDLE));
+        EXPECT_TRUE(submitCommands(device_.queue, commands_, after, {}, VK_NULL_HANDLE));
         EXPECT_EQ(vkDeviceWaitIdle(device_.device), VK_SUCCESS);
     }
 

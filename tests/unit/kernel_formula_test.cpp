@@ -2,13 +2,16 @@
 // calls the formula itself nothing may differ; where it writes it out again (GCC turns only that into SIMD), units in
 // the last place.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
 #include "shaders/shared/pack.h"
 #include "shaders/shared/shade.h"
+#include "shaders/shared/shadow.h"
 #include "shaders/shared/splat_disc.h"
 #include "shaders/shared/splat_size.h"
+#include "shaders/shared/surface.h"
 #include "tests/unit/kernel_formulas.h"
 
 namespace stipple {
@@ -328,6 +331,58 @@ TEST(KernelFormulas, LightIsThatOfTheFormulas) {
         }
         // 1 + share (light - 1): a light of little is rounded at the size of 1.
         EXPECT_LE(worst, 16);
+    });
+}
+
+// Rows whose pixels are all lit are lit where they lie, others closed up first: the same to the bit.
+TEST(KernelFormulas, LightOfAPixelIsTheSameWhateverIsBesideIt) {
+    forKernels([](const cpu::Kernels& k, FrameConstants f) {
+        Rng rng(8);
+        f.shade = kShadeTriangles;
+        f.lightCount = 2;
+        f.ambient = 0.3f;
+        f.skyDirection = {0, -1, 0};
+        LightSource lights[2]{};
+        lights[0].position = glm::normalize(glm::vec3(-0.4f, -0.5f, -0.7f));
+        lights[0].kind = kLightDirectional;
+        lights[0].colour = {2, 1.9f, 1.7f};
+        lights[1].position = {0.5f, -1, 3};
+        lights[1].kind = kLightPoint;
+        lights[1].colour = {3, 3, 4};
+        const std::array<uint32_t, 2> slots{1, 0};
+        const cpu::LightInput input{lights, nullptr, slots.data()};
+        const auto all = std::make_unique<cpu::SurfaceRow>();
+        all->hasTriangles = all->hasEmission = true;
+        all->shadowSlots = 1;
+        all->isShadowed[0] = true;
+        for (size_t i = 0; i < cpu::kTile; ++i) {
+            const auto n = glm::normalize(glm::vec3(uniform(rng, -1, 1), uniform(rng, -1, 1), uniform(rng, -1, -0.1)));
+            all->depth[i] = uniform(rng, 2, 6);
+            all->nx[i] = n.x;
+            all->ny[i] = n.y;
+            all->nz[i] = n.z;
+            all->leaf[i] = rng.below(4) == 0 ? 1.0f : 0.0f;
+            all->material[i] = kPixelTriangle | (static_cast<uint32_t>(rng.below(0x10000)) | 0xff0000u);
+            all->emission[i] = packColour(uniform(rng, 0, 1), uniform(rng, 0, 1), uniform(rng, 0, 1));
+            all->shadow[0][i] = packLight(vec3(uniform(rng, 0, 1), uniform(rng, 0, 1), uniform(rng, 0, 1)));
+            all->red[i] = uniform(rng, 0, 1);
+            all->green[i] = uniform(rng, 0, 1);
+            all->blue[i] = uniform(rng, 0, 1);
+        }
+        const auto some = std::make_unique<cpu::SurfaceRow>(*all);
+        const auto isLit = [](size_t i) { return i % 7 != 0 && i % 11 != 3; };
+        for (size_t i = 0; i < cpu::kTile; ++i)
+            if (!isLit(i)) some->material[i] |= kPixelUnlit;
+        const cpu::SurfaceRow before = *some;
+        k.lightRow(f, input, 64, 3, cpu::kTile, *all);
+        k.lightRow(f, input, 64, 3, cpu::kTile, *some);
+        for (size_t i = 0; i < cpu::kTile; ++i) {
+            const cpu::SurfaceRow& expected = isLit(i) ? *all : before;
+            EXPECT_EQ(some->red[i], expected.red[i]) << i;
+            EXPECT_EQ(some->green[i], expected.green[i]) << i;
+            EXPECT_EQ(some->blue[i], expected.blue[i]) << i;
+            EXPECT_NE(all->red[i], before.red[i]) << i;
+        }
     });
 }
 

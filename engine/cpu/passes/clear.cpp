@@ -12,8 +12,8 @@ void resize(Frame& frame) {
     const size_t pixels = size_t{w} * h;
     resizeHuge(frame.image->rgba, pixels);
     resizeHuge(frame.image->depth, frame.wantAll ? pixels : 0);
-    resizeHuge(frame.image->normal, frame.wantAll ? pixels * 3 : 0);
-    resizeHuge(frame.image->linear, frame.wantAll ? pixels * 3 : 0);
+    resizeHuge(frame.image->normal, frame.wantsRest ? pixels * 3 : 0);
+    resizeHuge(frame.image->linear, frame.wantsRest ? pixels * 3 : 0);
     if (frame.hasPyramid || frame.hasSmooth) frame.pyramid.resize(w, h, frame.constants.hasMaterials != 0);
     if (!frame.hasPyramid) frame.shownRows.resize(size_t{(w + kTile - 1) / kTile} * h);
     if (frame.visibilityPixels == pixels) return;  // it is clear whatever its shape

@@ -34,9 +34,9 @@ EmptyPixel emptyPixel(const Frame& frame) {
 
 ShadeOutput outputAt(Frame& frame, size_t pixel) {
     render::Image& image = *frame.image;
-    const bool all = frame.wantAll;
-    return {image.rgba.data() + pixel, all ? image.depth.data() + pixel : nullptr,
-            all ? image.normal.data() + 3 * pixel : nullptr, all ? image.linear.data() + 3 * pixel : nullptr};
+    const bool rest = frame.wantsRest;
+    return {image.rgba.data() + pixel, frame.wantAll ? image.depth.data() + pixel : nullptr,
+            rest ? image.normal.data() + 3 * pixel : nullptr, rest ? image.linear.data() + 3 * pixel : nullptr};
 }
 
 /// The planes of the surface buffer from a pixel on.
@@ -109,9 +109,11 @@ class RowProgram {
         surface.hasBehind = false;
         SurfaceWants made = wants;
         made.depth = made.depth || smooth != nullptr;
+        made.isMerged = frame_.hasPyramid;
         frame_.k.surfaceRow(f, own, row, planes, made, x0, y, n, surface);
         if (smooth != nullptr && planes.smooth != nullptr) {
             thread_local SurfaceRow mean{};
+            made.isMerged = true;
             frame_.k.surfaceRow(f, *smooth, *smooth, {}, made, x0, y, n, mean);
             frame_.k.smoothRow(f, *smooth, mean, planes, n, surface);
         }
