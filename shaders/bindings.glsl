@@ -12,6 +12,7 @@
 #include "shared/material.h"
 #include "shared/pack.h"
 #include "shared/pyramid.h"
+#include "shared/pyramid_tail.h"
 #include "shared/record.h"
 #include "shared/shade.h"
 #include "shared/curve.h"

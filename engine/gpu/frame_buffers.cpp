@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cstring>
 
+#include "engine/base/check.h"
 #include "engine/gpu/pipelines.h"
 #include "engine/render/layers.h"
+#include "shaders/shared/pyramid_tail.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/wide_disc.h"
 
@@ -76,6 +78,7 @@ Result<void> FrameBuffers::preparePlanes(const render::RenderRequest& request) {
         words += (uint64_t{kTexelWords} + (draws.frame.hasMaterials != 0 ? 1 : 0)) * lw * lh;
         if (lw == 1 && lh == 1) break;
     }
+    STIPPLE_CHECK(levels_.size() <= kPyramidLevels, "a picture has more levels than are counted");
     texelsOfPixels_ = static_cast<uint32_t>(words);
     if (has(request, render::Pass::smooth))
         words += (uint64_t{kTexelWords} + (draws.frame.hasMaterials != 0 ? 1 : 0)) * w * h;

@@ -38,8 +38,8 @@ class Recording {
     void overBlocks(const std::string& shader, size_t blocks);
     /// Groups for bands of rows: what covers many pixels is shared out. `firstBlock`: of the ids that are drawn.
     void overBands(const std::string& label, const std::string& shader, uint32_t firstBlock = 0);
-    /// One thread a texel, where the device has found (levelGroups) that there are any; the step is from `level` to the
-    /// next.
+    /// One thread a texel, if the device has found that the level holds any (`ofGroups`: of levelGroups in
+    /// shaders/bindings.glsl); the step is from `level` to the next.
     void overLevel(const std::string& label, const std::string& shader, size_t level, uint32_t ofGroups);
     /// One group; the step is from `level` to the next.
     void once(const std::string& label, const std::string& shader, size_t level = 0);

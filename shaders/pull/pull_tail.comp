@@ -4,7 +4,6 @@
 #extension GL_GOOGLE_include_directive : require
 #define TEXELS coherent
 #include "../bindings.glsl"
-#include "../shared/pyramid_tail.h"
 layout(local_size_x = 256) in;
 
 void main() {

@@ -2,7 +2,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../bindings.glsl"
-#include "../shared/pyramid_tail.h"
 layout(local_size_x = kLevelTile, local_size_y = kLevelTile) in;
 
 void main() {

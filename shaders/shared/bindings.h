@@ -69,10 +69,6 @@ const uint kOverBands = 1u;
 const uint kOverPixels = 2u;
 const uint kGroupShapes = 3u;
 
-// The same over the levels of the pyramid, once the largest splat is known: those that pull fills, then those that push
-// refines.
-const uint kPyramidLevels = 16u;  // of 32,768 pixels
-
 // `fine` and `coarse` are word offsets of the planes of two levels of the pyramid.
 struct Step {
     uint fine;

@@ -426,7 +426,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
     using render::Pass;
     using render::Plane;
     const std::map<Pass, std::vector<std::string>> shadersOf{
-        {Pass::smooth, {"project", "disc_order", "discs", "pull", "push"}},
+        {Pass::smooth, {"project", "disc_order", "discs", "pyramid_levels", "pull", "pull_tail", "push"}},
         {Pass::project, {"project"}},
         {Pass::discs, {"disc_order", "discs"}},
         {Pass::splat, {"splat", "discs"}},
@@ -437,7 +437,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
         {Pass::curves, {"curves", "curves_wide"}},
         {Pass::rasterise, {"rasterise", "rasterise_large"}},
         {Pass::resolve, {"resolve", "disc_texels", "curve_texels", "triangle_texels"}},
-        {Pass::pull, {"pull"}},
+        {Pass::pull, {"pyramid_levels", "pull", "pull_tail"}},
         {Pass::push, {"push"}},
         {Pass::surface, {"surface"}},
         {Pass::output, {"output"}}};
