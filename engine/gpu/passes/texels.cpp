@@ -33,7 +33,8 @@ constinit const GpuPass pullPass{[](Recording& f) {
 
 /// Down to level 1, but for what the tail has pushed: the last push fills the surface buffer.
 constinit const GpuPass pushPass{[](Recording& f) {
-    for (size_t l = firstOfTail(f.buffers().levels()); l-- > 1;) f.overLevel("push", "push", l, shared::kPyramidLevels + static_cast<uint32_t>(l));
+    for (size_t l = firstOfTail(f.buffers().levels()); l-- > 1;)
+        f.overLevel("push", "push", l, shared::kPyramidLevels + static_cast<uint32_t>(l));
 }};
 
 }  // namespace stipple::gpu
