@@ -15,12 +15,20 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
         if (!isTransfer && use.writes) access |= VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
         if (use.isIndirect) access = VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
         const VkPipelineStageFlags2 stage = use.isIndirect ? VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT : stageOfPass;
-        const auto found = last_.find(use.buffer);
-        if (found != last_.end() && (found->second.wrote || use.writes)) {
-            const VkAccessFlags2 before = found->second.wrote ? found->second.access : VK_ACCESS_2_NONE;
-            barriers.push_back(bufferBarrier(use.buffer, {found->second.stage, before}, {stage, access}));
+        Last& last = last_[use.buffer];
+        if (use.writes) {
+            // (What has been read was waited for, and is past.)
+            const BufferTouch before =
+                last.reads.stage != 0 ? BufferTouch{last.reads.stage, VK_ACCESS_2_NONE} : last.write;
+            if (before.stage != 0) barriers.push_back(bufferBarrier(use.buffer, before, {stage, access}));
+            last = {{stage, access}, {}};
+        } else {
+            const bool isVisible = (stage & ~last.reads.stage) == 0 && (access & ~last.reads.access) == 0;
+            if (last.write.stage != 0 && !isVisible)
+                barriers.push_back(bufferBarrier(use.buffer, last.write, {stage, access}));
+            last.reads.stage |= stage;
+            last.reads.access |= access;
         }
-        last_[use.buffer] = {stage, access, use.writes};
     }
     recordBarriers(commands_, barriers);
     STIPPLE_CHECK(names_.size() < kMaxPasses, "a frame has more passes than it has queries for their times");
@@ -29,7 +37,7 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
 }
 
 void PassList::wasCopied(VkBuffer buffer) {
-    last_[buffer] = {VK_PIPELINE_STAGE_2_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_READ_BIT, false};
+    last_[buffer].reads = {VK_PIPELINE_STAGE_2_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_READ_BIT};
 }
 
 void PassList::end() { stamp(static_cast<uint32_t>(names_.size()) * 2 - 1); }

@@ -32,10 +32,10 @@ class PassList {
 
   private:
     void stamp(uint32_t query);
+    /// The last write of a buffer, if there was one, and what has read it since: to those it is visible.
     struct Last {
-        VkPipelineStageFlags2 stage;
-        VkAccessFlags2 access;
-        bool wrote;
+        BufferTouch write{VK_PIPELINE_STAGE_2_NONE, VK_ACCESS_2_NONE},
+            reads{VK_PIPELINE_STAGE_2_NONE, VK_ACCESS_2_NONE};
     };
     const Device& device_;
     VkCommandBuffer commands_;
