@@ -111,15 +111,15 @@ Texel finished(Texel t) {
 }
 
 // Of a finished texel: the normal of the disc, as seen at its centre (a tube's: as seen at the pixel), and the depth of
-// its plane at the pixel.
+// its plane at the pixel (planeDepth).
 vec3 normalAt(Texel t, uvec2 pixel) {
     const vec2 at = vec2(pixel) + 0.5 - frame.centre;
     const float flat_ = 1.0 - t.isRound;
     return normalFromPerp(t.normalPerp, viewDirection(at.x + flat_ * t.offset.x, at.y + flat_ * t.offset.y, frameLensHere()));
 }
-float depthAt(Texel t, uvec2 pixel) {
+float depthAt(Texel t, uvec2 pixel, float isMerged) {
     const vec2 at = vec2(pixel) + 0.5 - frame.centre;
-    return planeDepth(t.depth, max(t.radius, 1.0e-3), t.normalPerp, t.offset.x, t.offset.y, t.isRound, float(stepInfo.hasPyramid | stepInfo.hasSmooth), at.x, at.y, frameLensHere());
+    return planeDepth(t.depth, max(t.radius, 1.0e-3), t.normalPerp, t.offset.x, t.offset.y, t.isRound, isMerged, at.x, at.y, frameLensHere());
 }
 
 void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 
 #include "apps/stipple/report.h"
 #include "engine/base/process.h"
@@ -17,12 +18,15 @@ namespace stipple::app {
 
 void Timings::add(double frameMs, const std::vector<render::PassTime>& times) {
     frames.push_back(frameMs);
-    passNames.clear();
-    passes.resize(times.size());
-    for (size_t i = 0; i < times.size(); ++i) {
-        passNames.push_back(times[i].name);
-        passes[i].push_back(times[i].ms);
+    // (Not every frame has every pass: copies come with new chunks. Some have one twice.)
+    std::map<std::string, double> sums;
+    for (const render::PassTime& time : times) {
+        sums[time.name] += time.ms;
+        if (std::find(passNames.begin(), passNames.end(), time.name) == passNames.end()) passNames.push_back(time.name);
     }
+    passes.resize(passNames.size());
+    for (size_t i = 0; i < passNames.size(); ++i)
+        if (const auto sum = sums.find(passNames[i]); sum != sums.end()) passes[i].push_back(sum->second);
 }
 
 namespace {

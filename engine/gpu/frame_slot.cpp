@@ -121,7 +121,8 @@ Result<void> FrameSlot::read(render::Image& image, std::vector<render::PassTime>
 void FrameSlot::takeTimes(std::vector<render::PassTime>& times) const {
     std::vector<uint64_t> stamps(labels_.size() * 2);
     times.clear();
-    if (const std::optional<double> ms = upload_->milliseconds()) times.push_back({"upload", *ms, true});
+    if (const std::optional<double> ms = upload_->milliseconds())
+        times.push_back({"upload", *ms, device_.copyFamily != device_.queueFamily});
     if (stamps.empty() ||
         vkGetQueryPoolResults(device_.device, queries_, 0, static_cast<uint32_t>(stamps.size()), stamps.size() * 8,
                               stamps.data(), 8, VK_QUERY_RESULT_64_BIT) != VK_SUCCESS)

@@ -135,7 +135,7 @@ void Recording::overBands(const std::string& label, const std::string& name, uin
 
 void Recording::overLevel(const std::string& label, const std::string& name, size_t level, uint32_t ofGroups) {
     counts_ = &buffers_.at(shared::kStatsBinding);
-    firstCounts_ = sizeof(uint32_t);  // behind the largest radius
+    firstCounts_ = bytesOf(shared::kStatsBinding, 0);  // behind the largest radius
     dispatch(label, known(name), stepAt(level), {ofGroups, 0, 0});
     counts_ = nullptr;
     firstCounts_ = 0;

@@ -65,6 +65,7 @@ static_assert(isLaidOut(shared::kSumsBinding, sizeof(shared::FilteredSums)));
 static_assert(isLaidOut(shared::kFilteredBinding, sizeof(shared::FilteredPixel)));
 static_assert(isLaidOut(shared::kMaterialSumsBinding, sizeof(shared::MaterialSums)));
 static_assert(isLaidOut(shared::kSecondGroupsBinding, sizeof(shared::GroupCounts)));
+static_assert(isLaidOut(shared::kStatsBinding, sizeof(shared::GroupCounts)));
 static_assert(isLaidOut(shared::kCoverageBinding, sizeof(uint32_t)));
 static_assert(isLaidOut(shared::kLayerBinding, sizeof(shared::LayerConstants)));
 static_assert(isLaidOut(shared::kOpticsBinding, sizeof(shared::Optic)));

@@ -356,7 +356,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         for (size_t l = pyramid.size() - 1; l-- > 0;)
             pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), view, variation_.kernel);
         level0 = std::move(pyramid[0]);
-        for (Sample& s : level0.samples) s.isMerged = true;
+        for (Sample& s : level0.samples) s.isMerged = pyramid.size() > 1;
     }
 
     void shade(const render::DrawList& draws, const Level& own, const Level& level, bool wantAll,

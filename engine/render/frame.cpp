@@ -295,9 +295,6 @@ void addTone(const DrawSettings& settings, EffectsOfFrame& shown) {
 
 Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
                      double cutMs) {
-    if (state.backendLife.expired() || state.executorLife.expired())
-        return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
-                    "keep the backend and the executor while it is used");
     STIPPLE_TRY(checkFilter(settings.draw));
     uint64_t passes = 0;
     state.effects = {};
@@ -382,7 +379,19 @@ bool learnHidden(FrameState& state, const FrameSettings& settings) {
 
 }  // namespace
 
+namespace {
+
+Result<void> checkAlive(const FrameState& state) {
+    if (state.backendLife.expired() || state.executorLife.expired())
+        return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
+                    "keep the backend and the executor while it is used");
+    return {};
+}
+
+}  // namespace
+
 Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    STIPPLE_TRY(checkAlive(state));
     const double start = nowSeconds();
     state.streamer->collect();
     state.streamer->upload();
@@ -392,6 +401,7 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
 }
 
 Result<void> renderResident(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    STIPPLE_TRY(checkAlive(state));
     return draw(state, view, settings, nowSeconds(), false);
 }
 
@@ -453,6 +463,7 @@ Result<bool> drawComplete(FrameState& state, const lod::View& view, const FrameS
 }  // namespace
 
 Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    STIPPLE_TRY(checkAlive(state));
     state.unrefined.clear();
     state.unrefined.beginView(view);
     constexpr int kMostPictures = 8;  // each but the first few refines something again for good

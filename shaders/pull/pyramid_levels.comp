@@ -2,7 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../bindings.glsl"
-layout(local_size_x = 32) in;
+layout(local_size_x = 2 * kPyramidLevels) in;
 
 void main() {
     const uint i = gl_LocalInvocationID.x;

@@ -24,7 +24,7 @@ void main() {
     s.material = stepInfo.hasTriangles != 0u ? triangleWords[2u * place] : 0u;
     if (t.depth != own.depth || s.material == 0u) s.material = surfaceWord(t.surface);  // no triangle, or a splat in front
     t = finished(t);
-    s.depth = t.depth > 0.0 ? depthAt(t, pixel) : t.depth;
+    s.depth = t.depth > 0.0 ? depthAt(t, pixel, float(stepInfo.hasPyramid)) : t.depth;
     s.normal = 0u;
     vec3 colour = t.colour;
     if (t.depth > 0.0) {
@@ -36,7 +36,7 @@ void main() {
     }
     if (stepInfo.hasSmooth != 0u && t.depth > 0.0 && isWideAt(place)) {
         const Texel mean = pushedTexel(ivec2(pixel), loadTexel(stepInfo.smoothTexels, stepInfo.fineWidth, stepInfo.fineHeight, int(pixel.x), int(pixel.y)));
-        if (isOfSurface(mean, depthAt(mean, pixel), s.depth, frameLensHere()) > 0.5) {
+        if (isOfSurface(mean, depthAt(mean, pixel, 1.0), s.depth, frameLensHere()) > 0.5) {
             const vec3 n = normalAt(mean, pixel);
             s.normal = octEncode(n);
             s.material = surfaceWord(mean.surface);

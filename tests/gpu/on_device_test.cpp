@@ -83,9 +83,9 @@ TEST(OnDevice, PicturesAreTheSameAndAreNotCopied) {
     for (const std::string& message : device->messages()) ADD_FAILURE() << message;
 }
 
-// Two views that have no room beside each other: what one lets go the other is copied over, while frames of both are on
-// their way. (On a card with an engine for copies beside them.)
-TEST(OnDevice, WhatComesAndGoesLeavesFramesInFlightAlone) {
+// Two views that have no room beside each other: what one lets go makes room for the other's, while frames are on their
+// way. (That no place is written while one of these may read it: Pages.AreNotWrittenAgain...)
+TEST(OnDevice, WhatComesAndGoesIsThereInTime) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
     test::writePly(folder / "a.ply", test::bumpySphere(120'000, 1));

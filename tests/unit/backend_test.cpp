@@ -71,6 +71,22 @@ TEST_F(Backends, GoBeforeOrAfterWhatTheyDrew) {
     }
 }
 
+TEST_F(Backends, RefuseFramesWhoseExecutorIsGone) {
+    const lod::View view = test::fitView(*a_, 160, 120);
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    auto executor = makeTbbExecutor(2);
+    auto state = makeFrameState({a_}, *backend, *executor, {});
+    ASSERT_TRUE(renderUntilComplete(*state, view, {}));
+    executor.reset();
+    const auto frame = renderFrame(*state, view, {}), resident = renderResident(*state, view, {});
+    const auto complete = renderUntilComplete(*state, view, {});
+    ASSERT_FALSE(frame || resident || complete);
+    for (const Error& error : {frame.error(), resident.error(), complete.error()}) {
+        EXPECT_EQ(error.kind, ErrorKind::device);
+        EXPECT_NE(error.line().find("executor"), std::string::npos) << error.line();
+    }
+}
+
 TEST_F(Backends, AreWaitedForOnTheExecutorOfTheirScene) {
     // The serial one runs what it was given only when somebody waits for it.
     const auto serial = makeSerialExecutor();

@@ -109,7 +109,7 @@ class RowProgram {
         surface.hasBehind = false;
         SurfaceWants made = wants;
         made.depth = made.depth || smooth != nullptr;
-        made.isMerged = frame_.hasPyramid;
+        made.isMerged = frame_.hasPyramid && frame_.pyramid.levels() > 1;
         frame_.k.surfaceRow(f, own, row, planes, made, x0, y, n, surface);
         if (smooth != nullptr && planes.smooth != nullptr) {
             thread_local SurfaceRow mean{};
