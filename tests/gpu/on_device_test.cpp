@@ -29,19 +29,36 @@ std::vector<uint32_t> copied(const DevicePicture& picture) {
     return {from, from + bytes / 4};
 }
 
-TEST(OnDevice, PicturesAreTheSameAndAreNotCopied) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    test::writePly(folder / "a.ply", test::bumpySphere(30'000, 1));
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 1024);
-    auto made = Device::create({"", true, {}, {}});
-    ASSERT_TRUE(made);
-    const std::shared_ptr<Device> device = std::move(*made);
-    auto backend = makeGpuBackendOn(device);
-    ASSERT_TRUE(backend);
-    render::Backend& gpu = **backend;
-    auto state = render::makeFrameState({store}, gpu, *executor, {});
-    const lod::View near = test::fitView(*store, 320, 240);
+/// A ball of points, and a backend on a device under validation.
+class OnDevice : public testing::Test {
+  protected:
+    void begin(size_t points, uint32_t recordsOfChunk) {
+        test::writePly(folder_ / "a.ply", test::bumpySphere(points, 1));
+        store_ = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_, recordsOfChunk);
+        auto made = Device::create({"", true, {}, {}});
+        ASSERT_TRUE(made) << made.error().line();
+        device_ = std::move(*made);
+        auto backend = makeGpuBackendOn(device_);
+        ASSERT_TRUE(backend) << backend.error().line();
+        backend_ = std::move(*backend);
+    }
+    void TearDown() override {
+        for (const std::string& message : device_ ? device_->messages() : std::vector<std::string>{})
+            ADD_FAILURE() << message;
+    }
+    const test::TempFolder folder_;
+    const std::unique_ptr<Executor> executor_ = makeTbbExecutor(0);
+    std::shared_ptr<const lod::Store> store_;
+    std::shared_ptr<Device> device_;
+    std::unique_ptr<render::Backend> backend_;
+};
+
+TEST_F(OnDevice, PicturesAreTheSameAndAreNotCopied) {
+    begin(30'000, 1024);
+    ASSERT_NE(backend_, nullptr);
+    render::Backend& gpu = *backend_;
+    auto state = render::makeFrameState({store_}, gpu, *executor_, {});
+    const lod::View near = test::fitView(*store_, 320, 240);
     lod::View aside = near;
     aside.eye += 0.3 * near.right;
     const auto isCopied = [&] {
@@ -77,26 +94,18 @@ TEST(OnDevice, PicturesAreTheSameAndAreNotCopied) {
     EXPECT_TRUE(copied(*pictureOf(gpu, last)) == read[&aside]);
     // Other sizes, and frames that nobody waits for.
     for (int k = 0; k < 6; ++k)
-        ASSERT_TRUE(render::renderResident(*state, test::fitView(*store, 200 + 90 * k % 400, 150), stays));
+        ASSERT_TRUE(render::renderResident(*state, test::fitView(*store_, 200 + 90 * k % 400, 150), stays));
     EXPECT_FALSE(pictureOf(gpu, last)) << "too old";
     ASSERT_TRUE(gpu.finish(*state->onDevice));
-    for (const std::string& message : device->messages()) ADD_FAILURE() << message;
 }
 
 // Two views that have no room beside each other: what one lets go makes room for the other's, while frames are on their
 // way. (That no place is written while one of these may read it: Pages.AreNotWrittenAgain...)
-TEST(OnDevice, WhatComesAndGoesIsThereInTime) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    test::writePly(folder / "a.ply", test::bumpySphere(120'000, 1));
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 512);
-    auto made = Device::create({"", true, {}, {}});
-    ASSERT_TRUE(made);
-    const std::shared_ptr<Device> device = std::move(*made);
-    auto backend = makeGpuBackendOn(device);
-    ASSERT_TRUE(backend);
-    render::Backend& gpu = **backend;
-    lod::View views[2] = {test::fitView(*store, 240, 180), test::fitView(*store, 240, 180)};
+TEST_F(OnDevice, WhatComesAndGoesIsThereInTime) {
+    begin(120'000, 512);
+    ASSERT_NE(backend_, nullptr);
+    render::Backend& gpu = *backend_;
+    lod::View views[2] = {test::fitView(*store_, 240, 180), test::fitView(*store_, 240, 180)};
     for (lod::View& v : views) v.focalPixels *= 5;
     views[0].eye += 0.25 * views[0].right;
     views[1].eye -= 0.25 * views[1].right;
@@ -107,14 +116,14 @@ TEST(OnDevice, WhatComesAndGoesIsThereInTime) {
     uint64_t most = 0;
     std::vector<uint32_t> expected[2];
     for (size_t v = 0; v < 2; ++v) {
-        auto alone = render::makeFrameState({store}, gpu, *executor, {});
+        auto alone = render::makeFrameState({store_}, gpu, *executor_, {});
         ASSERT_TRUE(render::renderUntilComplete(*alone, views[v], isRead).value_or(false));
         expected[v] = alone->image.rgba;
         most = std::max(most, alone->streamer->counters().residentBytes);
     }
     streaming::StreamSettings tight;
     tight.residentBytes = most + most / 8;
-    auto state = render::makeFrameState({store}, gpu, *executor, tight);
+    auto state = render::makeFrameState({store_}, gpu, *executor_, tight);
     for (size_t turn = 0; turn < 16; ++turn) {
         const size_t v = turn % 2;
         // Frames of what is there, one after another, before the last is waited for.
@@ -125,7 +134,6 @@ TEST(OnDevice, WhatComesAndGoesIsThereInTime) {
         EXPECT_TRUE(copied(*picture) == expected[v]) << turn;
     }
     EXPECT_GT(state->streamer->counters().evictions, 30u);
-    for (const std::string& message : device->messages()) ADD_FAILURE() << message;
 }
 
 }  // namespace
