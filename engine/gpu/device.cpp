@@ -92,6 +92,45 @@ tl::unexpected<Error> vulkanError(VkResult result, const std::string& what) {
     return fail(kind, fmt::format("{} (VkResult {})", what, static_cast<int>(result)), "Vulkan", "try --device cpu");
 }
 
+Result<VkCommandPool> makeCommandPool(const Device& device, uint32_t family) {
+    VkCommandPoolCreateInfo info{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+    info.queueFamilyIndex = family;
+    VkCommandPool pool = VK_NULL_HANDLE;
+    if (const VkResult r = vkCreateCommandPool(device.device, &info, nullptr, &pool); r != VK_SUCCESS)
+        return vulkanError(r, "no command pool");
+    return pool;
+}
+
+Result<VkCommandBuffer> makeCommands(const Device& device, VkCommandPool pool) {
+    VkCommandBufferAllocateInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    info.commandPool = pool;
+    info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+    info.commandBufferCount = 1;
+    VkCommandBuffer commands = VK_NULL_HANDLE;
+    if (const VkResult r = vkAllocateCommandBuffers(device.device, &info, &commands); r != VK_SUCCESS)
+        return vulkanError(r, "no command buffer");
+    return commands;
+}
+
+Result<VkFence> makeFence(const Device& device) {
+    const VkFenceCreateInfo info{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+    VkFence fence = VK_NULL_HANDLE;
+    if (const VkResult r = vkCreateFence(device.device, &info, nullptr, &fence); r != VK_SUCCESS)
+        return vulkanError(r, "no fence");
+    return fence;
+}
+
+Result<VkQueryPool> makeTimestamps(const Device& device, uint32_t count) {
+    VkQueryPoolCreateInfo info{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
+    info.queryType = VK_QUERY_TYPE_TIMESTAMP;
+    info.queryCount = count;
+    VkQueryPool queries = VK_NULL_HANDLE;
+    if (const VkResult r = vkCreateQueryPool(device.device, &info, nullptr, &queries); r != VK_SUCCESS)
+        return vulkanError(r, "no query pool");
+    return queries;
+}
+
 Result<void> submitCommands(VkQueue queue, VkCommandBuffer commands, SemaphoreValue after, SemaphoreValue then,
                             VkFence fence) {
     const auto infoOf = [](SemaphoreValue at, VkPipelineStageFlags2 stage) {

@@ -81,6 +81,15 @@ class Device {
 /// "what: VK_ERROR_..." as a device error.
 tl::unexpected<Error> vulkanError(VkResult result, const std::string& what);
 
+/// Of commands that are recorded again and again, for the queues of one family. What these four make is the caller's
+/// to destroy; commands go with their pool.
+Result<VkCommandPool> makeCommandPool(const Device& device, uint32_t family);
+Result<VkCommandBuffer> makeCommands(const Device& device, VkCommandPool pool);
+/// Not signalled.
+Result<VkFence> makeFence(const Device& device);
+/// A pool of `count` timestamps.
+Result<VkQueryPool> makeTimestamps(const Device& device, uint32_t count);
+
 /// A value that a timeline semaphore is to have. None: nothing is waited for or told.
 struct SemaphoreValue {
     VkSemaphore semaphore = VK_NULL_HANDLE;

@@ -24,25 +24,10 @@ FrameSlot::~FrameSlot() {
 }
 
 Result<void> FrameSlot::createCommandObjects() {
-    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = device_.queueFamily;
-    if (const VkResult r = vkCreateCommandPool(device_.device, &pool, nullptr, &commandPool_); r != VK_SUCCESS)
-        return vulkanError(r, "no command pool");
-    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-    allocate.commandPool = commandPool_;
-    allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    allocate.commandBufferCount = 1;
-    if (const VkResult r = vkAllocateCommandBuffers(device_.device, &allocate, &commands_); r != VK_SUCCESS)
-        return vulkanError(r, "no command buffer");
-    VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-    if (const VkResult r = vkCreateFence(device_.device, &fence, nullptr, &fence_); r != VK_SUCCESS)
-        return vulkanError(r, "no fence");
-    VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
-    query.queryType = VK_QUERY_TYPE_TIMESTAMP;
-    query.queryCount = PassList::kMaxPasses * 2;
-    if (const VkResult r = vkCreateQueryPool(device_.device, &query, nullptr, &queries_); r != VK_SUCCESS)
-        return vulkanError(r, "no query pool");
+    STIPPLE_ASSIGN(commandPool_, makeCommandPool(device_, device_.queueFamily));
+    STIPPLE_ASSIGN(commands_, makeCommands(device_, commandPool_));
+    STIPPLE_ASSIGN(fence_, makeFence(device_));
+    STIPPLE_ASSIGN(queries_, makeTimestamps(device_, PassList::kMaxPasses * 2));
     return {};
 }
 

@@ -40,20 +40,9 @@ Result<std::unique_ptr<Swapchain>> Swapchain::create(const Device& device, VkSur
     vkGetPhysicalDeviceSurfaceSupportKHR(device.physical, device.queueFamily, surface, &supported);
     if (!supported)
         return fail(ErrorKind::device, "cannot present to this display", device.deviceName, "use stipple render");
-    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = device.queueFamily;
-    if (const VkResult r = vkCreateCommandPool(device.device, &pool, nullptr, &s->pool_); r != VK_SUCCESS)
-        return vulkanError(r, "no command pool");
-    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-    allocate.commandPool = s->pool_;
-    allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    allocate.commandBufferCount = 1;
-    if (const VkResult r = vkAllocateCommandBuffers(device.device, &allocate, &s->commands_); r != VK_SUCCESS)
-        return vulkanError(r, "no command buffer");
-    VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-    if (const VkResult r = vkCreateFence(device.device, &fence, nullptr, &s->fence_); r != VK_SUCCESS)
-        return vulkanError(r, "no fence");
+    STIPPLE_ASSIGN(s->pool_, makeCommandPool(device, device.queueFamily));
+    STIPPLE_ASSIGN(s->commands_, makeCommands(device, s->pool_));
+    STIPPLE_ASSIGN(s->fence_, makeFence(device));
     VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
     if (const VkResult r = vkCreateSemaphore(device.device, &semaphore, nullptr, &s->acquired_); r != VK_SUCCESS)
         return vulkanError(r, "no semaphore");

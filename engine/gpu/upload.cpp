@@ -29,23 +29,11 @@ Result<void> Copies::waitFor(uint64_t value) const {
 
 Result<std::unique_ptr<Upload>> Upload::create(const Device& device, Copies& copies) {
     std::unique_ptr<Upload> upload(new Upload(device, copies));
-    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = device.copyFamily;
-    if (const VkResult r = vkCreateCommandPool(device.device, &pool, nullptr, &upload->pool_); r != VK_SUCCESS)
-        return vulkanError(r, "no command pool");
-    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-    allocate.commandPool = upload->pool_;
-    allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    allocate.commandBufferCount = 1;
-    if (const VkResult r = vkAllocateCommandBuffers(device.device, &allocate, &upload->commands_); r != VK_SUCCESS)
-        return vulkanError(r, "no command buffer");
-    if (!device.copiesTellTimes) return upload;
-    VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
-    query.queryType = VK_QUERY_TYPE_TIMESTAMP;
-    query.queryCount = 2;
-    if (const VkResult r = vkCreateQueryPool(device.device, &query, nullptr, &upload->queries_); r != VK_SUCCESS)
-        return vulkanError(r, "no query pool");
+    STIPPLE_ASSIGN(upload->pool_, makeCommandPool(device, device.copyFamily));
+    STIPPLE_ASSIGN(upload->commands_, makeCommands(device, upload->pool_));
+    if (device.copiesTellTimes) {
+        STIPPLE_ASSIGN(upload->queries_, makeTimestamps(device, 2));
+    }
     return upload;
 }
 
