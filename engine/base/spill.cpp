@@ -9,7 +9,7 @@
 
 namespace stipple {
 
-Result<void> Spill::append(const std::vector<uint8_t>& bytes) {
+Result<void> Spill::append(std::span<const uint8_t> bytes) {
     const std::lock_guard lock(mutex_);
     if (path_.empty()) {
         memory_.insert(memory_.end(), bytes.begin(), bytes.end());

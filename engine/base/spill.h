@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,7 +22,7 @@ class Spill {
         if (path_.empty() && memory_.empty()) reserveHuge(memory_, bytes);
     }
     /// From several threads; what one call brings stays together.
-    Result<void> append(const std::vector<uint8_t>& bytes);
+    Result<void> append(std::span<const uint8_t> bytes);
 
     const std::string& path() const { return path_; }
     /// So far.

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "engine/base/wide.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -16,6 +18,21 @@ constexpr size_t kLanesOfSpacing = 16;
 constexpr float kRoundedUp = 1 + 1e-6f;  // more than what floats may be off, here and there
 
 }  // namespace
+
+/// `at`: x, y, z of the records in blocks of kLanesOfSpacing from `first`; the first block with one within `squared` of
+/// `from`, or `end`.
+STIPPLE_WIDE static size_t blockWithin(const float* const (&at)[3], size_t first, size_t end, const float (&from)[3],
+                                       float squared) {
+    for (; first < end; first += kLanesOfSpacing) {
+        int32_t isNear = 0;
+        for (size_t k = first; k < first + kLanesOfSpacing; ++k) {
+            const float dx = at[0][k] - from[0], dy = at[1][k] - from[1], dz = at[2][k] - from[2];
+            isNear |= dx * dx + dy * dy + dz * dz <= squared ? 1 : 0;
+        }
+        if (isNear != 0) break;
+    }
+    return first;
+}
 
 float recordSpacing(std::span<const shared::PointRecord> records) {
     const size_t n = records.size();
@@ -36,18 +53,13 @@ float recordSpacing(std::span<const shared::PointRecord> records) {
         const shared::PointRecord& from = records[(p * 2654435761u + 12345u) % n];
         const auto x = int64_t{shared::recordX(from)}, y = int64_t{shared::recordY(from)},
                    z = int64_t{shared::recordZ(from)};
-        const auto fx = static_cast<float>(x), fy = static_cast<float>(y), fz = static_cast<float>(z);
+        const float place[3] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
         std::array<int64_t, kNeighbours + 1> nearest{};  // itself comes first
         nearest.fill(std::numeric_limits<int64_t>::max());
         float limit = std::numeric_limits<float>::max();
-        for (size_t first = 0; first < n; first += kLanesOfSpacing) {
-            int32_t isNear = 0;
-            for (size_t k = 0; k < kLanesOfSpacing; ++k) {
-                const float dx = xs[first + k] - fx, dy = ys[first + k] - fy, dz = zs[first + k] - fz;
-                const float squared = dx * dx + dy * dy + dz * dz;
-                isNear |= squared <= limit ? 1 : 0;
-            }
-            if (isNear == 0) continue;
+        for (size_t first = 0;
+             (first = blockWithin({xs.data(), ys.data(), zs.data()}, first, padded, place, limit)) < padded;
+             first += kLanesOfSpacing) {
             for (size_t k = first; k < std::min(n, first + kLanesOfSpacing); ++k) {
                 const int64_t dx = shared::recordX(records[k]) - x, dy = shared::recordY(records[k]) - y,
                               dz = shared::recordZ(records[k]) - z;

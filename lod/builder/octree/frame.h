@@ -17,6 +17,11 @@ namespace stipple::lod {
 /// Lattice coordinates, below 2^kPlaceBits: so many doubles hold. They are kept as 32 bits an axis, and where those are
 /// too few as one more word with the `high` bits of all axes.
 using Place = std::array<uint64_t, 3>;
+/// (== of arrays is a call of memcmp.)
+template <typename T>
+bool isSame(const std::array<T, 3>& a, const std::array<T, 3>& b) {
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
 constexpr uint32_t kPlaceBits = 53;
 inline Place placeOf(uint32_t x, uint32_t y, uint32_t z, uint64_t high) {
     constexpr uint32_t kBits = kPlaceBits - 32;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/base/numbers.h"
+#include "engine/base/wide.h"
 #include "lod/builder/points/covered.h"
 #include "lod/primitives/octahedral.h"
 #include "shaders/shared/border.h"
@@ -56,22 +57,58 @@ struct SixteenthTable {
 const SixteenthTable kSixteenths;
 uint32_t byteOf(float srgb) { return unitToByte(srgb); }
 
-bool hasNormal(const AggregateRecord& r) { return (r.flags & shared::kFlagNoNormal) == 0; }
+template <typename Part>
+bool hasNormal(const Part& r) {
+    return (r.flags & shared::kFlagNoNormal) == 0;
+}
 
-/// Means, ranges and flags of the parts.
-void addUp(std::span<const AggregateRecord> parts, AggregateRecord& out) {
+std::array<uint8_t, 3> channelsOf(uint32_t colour) {
+    return {static_cast<uint8_t>(colour), static_cast<uint8_t>(colour >> 8), static_cast<uint8_t>(colour >> 16)};
+}
+glm::vec3 linearOf(const std::array<uint8_t, 3>& channels) {
+    return {kLinear.of[channels[0]], kLinear.of[channels[1]], kLinear.of[channels[2]]};
+}
+
+/// As much of a point that stands for itself as means and ranges ask for.
+struct LeafPart {
+    static constexpr uint32_t count = 1;
+    static constexpr uint8_t code = 0;
+    uint32_t first;
+    uint8_t flags;
+    std::array<uint8_t, 3> least, greatest;
+    glm::dvec3 mean;
+    glm::vec3 meanColour, normal, meanNormal;
+    LeafPart(const Leaves& leaves, size_t i)
+        : first(static_cast<uint32_t>(i)),
+          flags(static_cast<uint8_t>(leaves.points.colour[i] >> 24)),
+          least(channelsOf(leaves.points.colour[i])),
+          greatest(least),
+          mean(leaves.points.at(i)),
+          meanColour(linearOf(least)),
+          normal(leaves.normalOf(i)),
+          meanNormal(normal) {}
+};
+
+/// Means, ranges and flags of `parts` of them, partAt(0) and so on.
+template <typename PartAt>
+void addUp(size_t parts, const PartAt& partAt, AggregateRecord& out) {
+    constexpr std::array<uint32_t, 3> kOfMost{shared::kFlagLeaf, shared::kFlagScattered, shared::kFlagBorder};
+    std::array<double, kOfMost.size()> such{};
     double count = 0;
     glm::dvec3 sum(0);
     glm::vec3 colour(0), normal(0), reference(0);
     bool allNone = true;
-    out.first = parts[0].first;
-    out.least = parts[0].least;
-    out.greatest = parts[0].greatest;
-    for (const AggregateRecord& p : parts) {
+    const auto& at0 = partAt(0);
+    const glm::dvec3 mean0 = at0.mean;
+    out.first = at0.first;
+    out.least = at0.least;
+    out.greatest = at0.greatest;
+    for (size_t i = 0; i < parts; ++i) {
+        const auto& p = partAt(i);
         const double weight = p.count;
         const auto w = static_cast<float>(p.count);
         count += weight;
-        sum += weight * (p.mean - parts[0].mean);
+        sum += weight * (p.mean - mean0);
         colour += w * p.meanColour;
         for (size_t k = 0; k < 3; ++k) {
             out.least[k] = std::min(out.least[k], p.least[k]);
@@ -82,6 +119,7 @@ void addUp(std::span<const AggregateRecord> parts, AggregateRecord& out) {
         out.code = std::max(out.code, p.code);
         out.first = std::min(out.first, p.first);
         out.count += p.count;
+        for (size_t k = 0; k < kOfMost.size(); ++k) such[k] += (p.flags & kOfMost[k]) != 0 ? weight : 0;
         if (!hasNormal(p)) continue;
         if (allNone) reference = p.normal;
         allNone = false;
@@ -90,13 +128,9 @@ void addUp(std::span<const AggregateRecord> parts, AggregateRecord& out) {
         normal += flip ? -w * p.meanNormal : w * p.meanNormal;
     }
     // What most of the leaves are.
-    for (const uint32_t flag : {shared::kFlagLeaf, shared::kFlagScattered, shared::kFlagBorder}) {
-        double such = 0;
-        for (const AggregateRecord& p : parts) such += (p.flags & flag) != 0 ? p.count : 0;
-        if (2 * such > count) out.flags = static_cast<uint8_t>(out.flags | flag);
-    }
-    out.key = parts[0].key;
-    out.mean = parts[0].mean + sum / count;
+    for (size_t k = 0; k < kOfMost.size(); ++k)
+        if (2 * such[k] > count) out.flags = static_cast<uint8_t>(out.flags | kOfMost[k]);
+    out.mean = mean0 + sum / count;
     out.meanColour = colour / static_cast<float>(count);
     out.meanNormal = normal / static_cast<float>(count);
     const float length = glm::length(out.meanNormal);
@@ -117,6 +151,24 @@ float colourSpread(const AggregateRecord& r, const glm::vec3& mean) {
     return spread;
 }
 
+}  // namespace
+
+/// Of leaves whose coordinates are 32 bits. (Distances are not negative: they have the order of their bits.)
+STIPPLE_WIDE static float reachOfNarrow(const Points& leaves, size_t begin, size_t end, const double (&from)[3]) {
+    const uint32_t *const x = leaves.x.data(), *const y = leaves.y.data(), *const z = leaves.z.data();
+    const float* const radius = leaves.radius.data();
+    int32_t most = 0;
+    for (size_t i = begin; i < end; ++i) {
+        const auto dx = static_cast<float>(x[i] - from[0]), dy = static_cast<float>(y[i] - from[1]),
+                   dz = static_cast<float>(z[i] - from[2]);
+        const auto reach = std::bit_cast<int32_t>(std::sqrt(dx * dx + dy * dy + dz * dz) + radius[i]);
+        most = reach > most ? reach : most;
+    }
+    return std::bit_cast<float>(most);
+}
+
+namespace {
+
 struct Extent {
     float reach = 0, inner = 0, above = 0, below = 0;
 };
@@ -130,13 +182,20 @@ struct Plane {
     }
 };
 
+/// How far the balls of leaves [begin, end) reach from a place.
+float reachOfBalls(const Points& leaves, size_t begin, size_t end, const glm::dvec3& from) {
+    float reach = 0;
+    if (leaves.high.empty()) return reachOfNarrow(leaves, begin, end, {from.x, from.y, from.z});
+    for (size_t i = begin; i < end; ++i)
+        reach = std::max(reach, glm::length(glm::vec3(leaves.at(i) - from)) + leaves.radius[i]);
+    return reach;
+}
+
 /// Of the leaves themselves.
 Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const AggregateRecord& out) {
     if (!hasNormal(out)) {  // a ball has no plane
         Extent e;
-        for (size_t i = begin; i < end; ++i)
-            e.reach =
-                std::max(e.reach, glm::length(glm::vec3(leaves.points.at(i) - out.place)) + leaves.points.radius[i]);
+        e.reach = reachOfBalls(leaves.points, begin, end, out.place);
         return e;
     }
     const Plane plane(out);
@@ -231,28 +290,29 @@ AggregateRecord aggregateOfLeaf(const Points& points, size_t i, Key key) {
     const uint32_t c = points.colour[i];
     r.flags = static_cast<uint8_t>(c >> 24);
     if (hasNormal(r)) r.normal = r.meanNormal = shared::octDecode(points.normal[i]);
-    for (size_t k = 0; k < 3; ++k) {
-        r.least[k] = r.greatest[k] = static_cast<uint8_t>(c >> (8 * k));
-        r.meanColour[static_cast<int>(k)] = kLinear.of[r.least[k]];
-    }
+    r.least = r.greatest = channelsOf(c);
+    r.meanColour = linearOf(r.least);
     r.radius = points.radius[i];
     r.inner = r.core = hasNormal(r) ? r.radius : 0.0f;
     return r;
 }
 
-AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
-                                const Around& around) {
-    AggregateRecord out;
-    addUp(parts, out);
+namespace {
+
+/// What follows from the means. `parts`: where no leaves are at hand.
+void complete(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
+              const Around& around, AggregateRecord& out) {
     const uint32_t normalCode = hasNormal(out) ? roundedNormal(out.normal) : 0;
     if (hasNormal(out)) out.normal = shared::octDecode(normalCode);
     // Position: to the nearest step, inside the cluster's own cell.
     std::array<uint32_t, 3> q{};
     const Key cluster = out.key >> grid.clusterShift;
-    const std::array<uint64_t, 3> index{compactBits(cluster), compactBits(cluster >> 1), compactBits(cluster >> 2)};
+    const auto inNode =
+        static_cast<uint64_t>(cluster) & (uint64_t{grid.cellsAcross} * grid.cellsAcross * grid.cellsAcross - 1);
+    const std::array<uint64_t, 3> index{compactShort(inNode), compactShort(inNode >> 1), compactShort(inNode >> 2)};
     for (int a = 0; a < 3; ++a) {
         const auto at = static_cast<size_t>(a);
-        const uint32_t first = static_cast<uint32_t>(index[at] & (grid.cellsAcross - 1)) * grid.cellSteps;
+        const uint32_t first = static_cast<uint32_t>(index[at]) * grid.cellSteps;
         const double wanted = std::floor((out.mean[a] - grid.base[a]) / grid.step + 0.5);
         q[at] = toWhole<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
         out.place[a] = grid.base[a] + grid.step * q[at];
@@ -274,7 +334,7 @@ AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const Aggregat
         error = out.count == 1 ? 0.0 : coveringErrorOfBall(out, parts, leaves);
     }
     if (out.count == 1) {  // the same disc, moved and rounded up
-        out.inner = parts[0].inner;
+        out.inner = leaves == nullptr ? parts[0].inner : hasNormal(out) ? leaves->points.radius[out.first] : 0.0f;
         error = glm::length(out.mean - out.place) + radius - static_cast<double>(out.inner);
     }
     const glm::vec3 colour(shared::srgbFromLinear(out.meanColour.x), shared::srgbFromLinear(out.meanColour.y),
@@ -284,6 +344,27 @@ AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const Aggregat
     if (out.count > 1) out.code = static_cast<uint8_t>(coveringCode(out, around, out.code));
     out.packed = {q[0] | q[1] << 16, q[2] | radiusCode << 16 | uint32_t{out.code} << 24, normalCode,
                   byteOf(colour.x) | byteOf(colour.y) << 8 | byteOf(colour.z) << 16 | uint32_t{out.flags} << 24};
+}
+
+}  // namespace
+
+AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
+                                const Around& around) {
+    AggregateRecord out;
+    out.key = parts[0].key;
+    addUp(
+        parts.size(), [&](size_t i) -> const AggregateRecord& { return parts[i]; }, out);
+    complete(grid, parts, leaves, around, out);
+    return out;
+}
+
+AggregateRecord mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, size_t end,
+                            const Around& around) {
+    AggregateRecord out;
+    out.key = leaves.key[begin];
+    addUp(
+        end - begin, [&](size_t i) { return LeafPart(leaves, begin + i); }, out);
+    complete(grid, {}, &leaves, around, out);
     return out;
 }
 

@@ -31,5 +31,8 @@ bool splitByNormals(std::span<const AggregateRecord> parts, std::vector<uint8_t>
 /// points of the cell are meant. `around`: what the disc is held against.
 AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
                                 const Around& around);
+/// The points [begin, end), which are all of a cluster's cell.
+AggregateRecord mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, size_t end,
+                            const Around& around);
 
 }  // namespace stipple::lod

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "engine/base/huge_buffer.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::lod {
@@ -48,9 +49,8 @@ BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) 
         for (uint32_t c = 0; c < subtree.cells; ++c)
             plan.ofCell[subtree.firstCell + c] = static_cast<uint32_t>(plan.buckets.size() - 1);
     }
-    // Beside which cells does another bucket begin? Buckets are runs of cells, so the first and the last cell of a
-    // neighbouring place of the same size tell.
-    plan.isBorder.assign(cells.size(), 0);
+    // Beside which cells does another bucket begin, and how small are its cells?
+    plan.border.assign(cells.size(), 0);
     for (size_t i = 0; i < cells.size(); ++i) {
         const auto corner = cornerOf(frame, cells[i].key);
         const auto edge = static_cast<int64_t>(frame.cellSize(cells[i].level)), root = int64_t{1} << frame.rootLog2;
@@ -64,14 +64,14 @@ BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) 
                                                     [&](const Cell& c) { return c.key >> shift < key >> shift; });
             const auto end =
                 std::partition_point(first, cells.end(), [&](const Cell& c) { return c.key >> shift == key >> shift; });
-            const auto isOther = [&](size_t other) { return plan.ofCell[other] != plan.ofCell[i]; };
-            if (first != end) {
-                if (isOther(static_cast<size_t>(first - cells.begin())) ||
-                    isOther(static_cast<size_t>(end - cells.begin()) - 1))
-                    plan.isBorder[i] = 1;
-            } else if (const uint32_t larger = tree.cellOf(key); larger != CellTree::kNone && isOther(larger)) {
-                plan.isBorder[i] = 1;
-            }
+            const auto look = [&](size_t other) {
+                if (plan.ofCell[other] == plan.ofCell[i]) return;
+                const uint8_t level = std::max(cells[other].level, cells[i].level);
+                plan.border[i] = std::max(plan.border[i], static_cast<uint8_t>(level + 1));
+            };
+            for (auto other = first; other != end; ++other) look(static_cast<size_t>(other - cells.begin()));
+            if (const uint32_t larger = first == end ? tree.cellOf(key) : CellTree::kNone; larger != CellTree::kNone)
+                look(larger);
         }
     }
     return plan;
@@ -90,78 +90,57 @@ RecordLayout::RecordLayout(bool hasColour, bool hasNormal, bool hasRadius, const
     }
 }
 
-void RecordLayout::write(const Points& from, size_t i, uint8_t* to) const {
-    const std::array<uint32_t, 3> first{from.x[i], from.y[i], from.z[i]};
-    std::memcpy(to, first.data(), 12);
-    to += 12;
-    if (isWide_) {
-        const uint64_t high = from.high.empty() ? 0 : from.high[i];
-        std::memcpy(to, &high, 8);
-        to += 8;
-    }
-    if (hasWord_) {
-        std::memcpy(to, &from.colour[i], 4);
-        to += 4;
-    }
-    if (hasNormal_) {
-        std::memcpy(to, &from.normal[i], 4);
-        to += 4;
-    }
-    if (hasRadius_) {
-        std::memcpy(to, &from.radius[i], 4);
-        to += 4;
-    }
-    for (size_t a = 0; a < widths_.size(); ++a) {
-        std::memcpy(to, from.attributes[a].data() + i * widths_[a], widths_[a]);
-        to += widths_[a];
-    }
-}
-
-void RecordLayout::readPlace(const uint8_t*& from, size_t i, Points& to) const {
-    std::array<uint32_t, 3> first{};
-    std::memcpy(first.data(), from, 12);
-    to.x[i] = first[0];
-    to.y[i] = first[1];
-    to.z[i] = first[2];
-    from += 12;
+void RecordLayout::writePlace(const Place& place, uint8_t* to) const {
+    const std::array<uint32_t, 3> low{static_cast<uint32_t>(place[0]), static_cast<uint32_t>(place[1]),
+                                      static_cast<uint32_t>(place[2])};
+    std::memcpy(to, low.data(), 12);
     if (!isWide_) return;
-    std::memcpy(&to.high[i], from, 8);
-    from += 8;
+    const uint64_t high = highOf(place);
+    std::memcpy(to + 12, &high, 8);
 }
 
-void RecordLayout::readGhosts(const uint8_t* from, size_t count, Points& to) const {
-    for (auto* column : {&to.x, &to.y, &to.z}) column->resize(count);
-    to.high.resize(isWide_ ? count : 0);
-    for (size_t i = 0; i < count; ++i) readPlace(from, i, to);
+void RecordLayout::write(const Points& from, size_t i, uint8_t* to) const {
+    writePlace(from.place(i), to);
+    to += ghostBytes();
+    const auto put = [&](const void* value, size_t bytes) {
+        std::memcpy(to, value, bytes);
+        to += bytes;
+    };
+    if (hasWord_) put(&from.colour[i], 4);
+    if (hasNormal_) put(&from.normal[i], 4);
+    if (hasRadius_) put(&from.radius[i], 4);
+    for (size_t a = 0; a < widths_.size(); ++a) put(from.attributes[a].data() + i * widths_[a], widths_[a]);
 }
 
-void RecordLayout::read(const uint8_t* from, size_t count, Points& to) const {
-    const size_t before = to.size();
-    to.high.resize(isWide_ ? before + count : 0);
-    for (auto* column : {&to.x, &to.y, &to.z, &to.colour, &to.normal}) column->resize(before + count);
-    to.radius.resize(before + count);
-    to.attributes.resize(widths_.size());
-    for (size_t a = 0; a < widths_.size(); ++a) to.attributes[a].resize((before + count) * widths_[a]);
-    for (size_t i = before; i < before + count; ++i) {
-        readPlace(from, i, to);
-        to.colour[i] = kPlainColour | shared::kFlagNoNormal << 24;
-        if (hasWord_) {
-            std::memcpy(&to.colour[i], from, 4);
-            from += 4;
-        }
-        if (hasNormal_) {
-            std::memcpy(&to.normal[i], from, 4);
-            from += 4;
-        }
-        if (hasRadius_) {
-            std::memcpy(&to.radius[i], from, 4);
-            from += 4;
-        }
-        for (size_t a = 0; a < widths_.size(); ++a) {
-            std::memcpy(to.attributes[a].data() + i * widths_[a], from, widths_[a]);
-            from += widths_[a];
-        }
-    }
+Place RecordLayout::placeAt(const uint8_t* from) const {
+    std::array<uint32_t, 3> first{};
+    uint64_t high = 0;
+    std::memcpy(first.data(), from, 12);
+    if (isWide_) std::memcpy(&high, from + 12, 8);
+    return placeOf(first[0], first[1], first[2], high);
+}
+
+void RecordLayout::resize(Points& points, size_t count) const {
+    for (auto* column : {&points.x, &points.y, &points.z, &points.normal}) resizeHuge(*column, count);
+    resizeHuge(points.colour, count);
+    resizeHuge(points.radius, count);
+    points.high.resize(isWide_ ? count : 0);
+    points.attributes.resize(widths_.size());
+    for (size_t a = 0; a < widths_.size(); ++a) points.attributes[a].resize(count * widths_[a]);
+}
+
+void RecordLayout::read(const uint8_t* from, size_t i, Points& to) const {
+    const auto take = [&](void* value, size_t bytes) {
+        std::memcpy(value, from, bytes);
+        from += bytes;
+    };
+    for (auto* column : {&to.x, &to.y, &to.z}) take(&(*column)[i], 4);
+    if (isWide_) take(&to.high[i], 8);
+    to.colour[i] = kPlainColour | shared::kFlagNoNormal << 24;
+    if (hasWord_) take(&to.colour[i], 4);
+    if (hasNormal_) take(&to.normal[i], 4);
+    if (hasRadius_) take(&to.radius[i], 4);
+    for (size_t a = 0; a < widths_.size(); ++a) take(to.attributes[a].data() + i * widths_[a], widths_[a]);
 }
 
 // ---- where they lie ----
@@ -183,48 +162,53 @@ Distributor::Distributor(const Frame& frame, const CellTree& tree, const BucketP
     : frame_(frame), tree_(tree), plan_(plan), layout_(layout), buckets_(buckets), wantGhosts_(wantGhosts) {
     const size_t slots = 2 * plan.buckets.size();
     bufferBytes_ = std::clamp<size_t>(bufferBytes / (static_cast<size_t>(workers) * slots), 4096, 1 << 18);
-    buffers_.assign(static_cast<size_t>(workers), std::vector<std::vector<uint8_t>>(slots));
+    buffers_.assign(static_cast<size_t>(workers), std::vector<Buffer>(slots));
     std::array<bool, kPlaceBits + 1> has{};
     for (const Cell& c : tree.cells()) has.at(c.level) = true;
     for (uint32_t level = 0; level < has.size(); ++level)
         if (has.at(level)) levels_.push_back(level);
 }
 
-Result<void> Distributor::put(int worker, uint32_t bucket, int kind, const uint8_t* bytes, size_t count) {
-    std::vector<uint8_t>& buffer = buffers_[static_cast<size_t>(worker)][2 * bucket + static_cast<size_t>(kind)];
-    if (buffer.capacity() == 0) buffer.reserve(bufferBytes_);
-    const size_t at = buffer.size();
-    buffer.resize(at + count);
-    std::memcpy(buffer.data() + at, bytes, count);
-    if (at + 2 * count <= bufferBytes_) return {};
-    STIPPLE_TRY((kind == 0 ? buckets_[bucket]->points : buckets_[bucket]->ghosts).append(buffer));
-    buffer.clear();
+template <typename Write>
+Result<void> Distributor::put(int worker, uint32_t bucket, size_t kind, size_t count, const Write& write) {
+    const size_t slot = 2 * bucket + kind;
+    Buffer& buffer = buffers_[static_cast<size_t>(worker)][slot];
+    if (buffer.bytes.empty()) buffer.bytes.resize(std::max(bufferBytes_, count));
+    write(buffer.bytes.data() + buffer.used);
+    buffer.used += count;
+    if (buffer.used + count <= buffer.bytes.size()) return {};
+    return send(slot, buffer);
+}
+
+Result<void> Distributor::send(size_t slot, Buffer& buffer) {
+    BucketBytes& bucket = *buckets_[slot / 2];
+    STIPPLE_TRY(
+        (slot % 2 == kPoints ? bucket.points : bucket.ghosts).append(std::span(buffer.bytes).first(buffer.used)));
+    buffer.used = 0;
     return {};
 }
 
 Result<void> Distributor::flush() {
     for (auto& worker : buffers_)
         for (size_t slot = 0; slot < worker.size(); ++slot) {
-            if (!worker[slot].empty()) {
-                BucketBytes& bucket = *buckets_[slot / 2];
-                STIPPLE_TRY((slot % 2 == 0 ? bucket.points : bucket.ghosts).append(worker[slot]));
-            }
+            if (worker[slot].used > 0) STIPPLE_TRY(send(slot, worker[slot]));
             worker[slot] = {};
         }
     return {};
 }
 
 Result<void> Distributor::add(int worker, const Points& block) {
-    std::vector<uint8_t> record(layout_.bytes());
     std::vector<uint32_t> seenFrom;
     for (size_t i = 0; i < block.size(); ++i) {
         const Place place = block.place(i);
         const uint32_t cell = tree_.cellOf(frame_.keyOf(place));
-        layout_.write(block, i, record.data());
-        STIPPLE_TRY(put(worker, plan_.ofCell[cell], 0, record.data(), record.size()));
-        if (!wantGhosts_ || plan_.isBorder[cell] == 0) continue;
+        STIPPLE_TRY(put(worker, plan_.ofCell[cell], kPoints, layout_.bytes(),
+                        [&](uint8_t* to) { layout_.write(block, i, to); }));
+        if (!wantGhosts_ || plan_.border[cell] == 0) continue;
         ghosts(cell, place, seenFrom);
-        for (const uint32_t bucket : seenFrom) STIPPLE_TRY(put(worker, bucket, 1, record.data(), layout_.ghostBytes()));
+        for (const uint32_t bucket : seenFrom)
+            STIPPLE_TRY(put(worker, bucket, kGhosts, layout_.ghostBytes(),
+                            [&](uint8_t* to) { layout_.writePlace(place, to); }));
     }
     return {};
 }
@@ -235,25 +219,29 @@ void Distributor::ghosts(uint32_t cell, const Place& place, std::vector<uint32_t
     const uint32_t own = tree_.cells()[cell].level;
     for (const uint32_t level : levels_) {
         if (level < own) continue;
+        if (level >= plan_.border[cell]) return;
         // A cell of this size (or, at the point's own, a larger one) within a quarter of it holds one of these places.
         const int64_t size = int64_t{1} << (frame_.rootLog2 - level), reach = size / 4,
                       ownSize = int64_t{1} << (frame_.rootLog2 - own);
         const std::array<int64_t, 3> p{static_cast<int64_t>(place[0]), static_cast<int64_t>(place[1]),
                                        static_cast<int64_t>(place[2])};
-        std::array<std::array<bool, 3>, 3>
-            leaves{};  // per axis: does -reach, 0, +reach lead out of a cell of this size?
+        // Steps along each axis that lead out of a cell of this size, or nowhere.
+        std::array<std::array<int64_t, 3>, 3> places{};
+        std::array<size_t, 3> steps{};
         bool isNear = false;
         for (size_t a = 0; a < 3; ++a) {
             const int64_t local = p[a] & (size - 1), inOwn = p[a] & (ownSize - 1);
-            leaves[a] = {local < reach, true, local + reach >= size};
+            const auto add = [&](int64_t by) { places[a][steps[a]++] = p[a] + by; };
+            if (local < reach) add(-reach);
+            add(0);
+            if (local + reach >= size) add(reach);
             isNear = isNear || inOwn < reach || inOwn + reach >= ownSize;
         }
         if (!isNear) return;  // nor is it within less
-        for (size_t k = 0; k < 27; ++k) {
-            const std::array<size_t, 3> step{k % 3, k / 3 % 3, k / 9};
-            if (k == 13 || !leaves[0][step[0]] || !leaves[1][step[1]] || !leaves[2][step[2]]) continue;
-            std::array<int64_t, 3> q{};
-            for (size_t a = 0; a < 3; ++a) q[a] = p[a] + (static_cast<int64_t>(step[a]) - 1) * reach;
+        for (size_t k = 0; k < steps[0] * steps[1] * steps[2]; ++k) {
+            const std::array<int64_t, 3> q{places[0][k % steps[0]], places[1][k / steps[0] % steps[1]],
+                                           places[2][k / (steps[0] * steps[1])]};
+            if (isSame(q, p)) continue;
             const uint32_t other = cellAt(frame_, tree_, q);
             if (other == CellTree::kNone) continue;
             const uint32_t otherLevel = tree_.cells()[other].level, bucket = plan_.ofCell[other];

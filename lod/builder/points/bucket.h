@@ -18,7 +18,9 @@ struct BucketPlan {
     };
     std::vector<Bucket> buckets;
     std::vector<uint32_t> ofCell;
-    std::vector<uint8_t> isBorder;  ///< a cell beside which lies another bucket's
+    /// Of a cell beside which lies another bucket's: one more than the level of the smallest of those, or than its own
+    /// if that is finer; of others 0.
+    std::vector<uint8_t> border;
 };
 /// Buckets of at most `most` points (but for single cells of the deepest level).
 BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most);
@@ -34,16 +36,19 @@ class RecordLayout {
         isWide_ = isWide;
     }
     size_t bytes() const { return bytes_; }
+    bool isWide() const { return isWide_; }
     /// A ghost is the beginning of a record: its place.
     size_t ghostBytes() const { return isWide_ ? 20 : 12; }
     void write(const Points& from, size_t i, uint8_t* to) const;
-    /// Appends records to `to`.
-    void read(const uint8_t* from, size_t count, Points& to) const;
-    /// Places alone.
-    void readGhosts(const uint8_t* from, size_t count, Points& to) const;
+    /// Of a ghost.
+    void writePlace(const Place& place, uint8_t* to) const;
+    /// Of a record, or of a ghost.
+    Place placeAt(const uint8_t* from) const;
+    void resize(Points& points, size_t count) const;
+    /// One record to point i, which is there.
+    void read(const uint8_t* from, size_t i, Points& to) const;
 
   private:
-    void readPlace(const uint8_t*& from, size_t i, Points& to) const;
     bool hasWord_, hasNormal_, hasRadius_, isWide_ = false;
     std::vector<size_t> widths_;
     size_t bytes_;
@@ -70,7 +75,16 @@ class Distributor {
 
   private:
     void ghosts(uint32_t cell, const Place& place, std::vector<uint32_t>& to) const;
-    Result<void> put(int worker, uint32_t bucket, int kind, const uint8_t* bytes, size_t count);
+    /// Bytes on their way to a bucket: [0, used) of them.
+    struct Buffer {
+        std::vector<uint8_t> bytes;
+        size_t used = 0;
+    };
+    static constexpr size_t kPoints = 0, kGhosts = 1;
+    /// Calls write(to) with room for `count` bytes.
+    template <typename Write>
+    Result<void> put(int worker, uint32_t bucket, size_t kind, size_t count, const Write& write);
+    Result<void> send(size_t slot, Buffer& buffer);
 
     const Frame& frame_;
     const CellTree& tree_;
@@ -79,8 +93,8 @@ class Distributor {
     Buckets& buckets_;
     size_t bufferBytes_;
     bool wantGhosts_;
-    std::vector<uint32_t> levels_;                            ///< of counted cells, coarsest first
-    std::vector<std::vector<std::vector<uint8_t>>> buffers_;  ///< worker, 2 * bucket + kind
+    std::vector<uint32_t> levels_;              ///< of counted cells, coarsest first
+    std::vector<std::vector<Buffer>> buffers_;  ///< worker, 2 * bucket + kind
 };
 
 }  // namespace stipple::lod

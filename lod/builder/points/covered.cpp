@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "engine/base/wide.h"
 #include "lod/builder/morton.h"
 
 namespace stipple::lod {
@@ -46,9 +47,11 @@ float reachOf(float extent, float height, float hole, float error) {
 }
 constexpr float kRounded = 1 - 1e-5f;
 
+}  // namespace
+
 /// Appends the circles of the leaves `begin`, `begin + stride`, ... that are within `error` of one.
-void addLeaves(const Around& around, const DiscPlane& plane, size_t begin, size_t end, size_t stride, float error,
-               Circles& to) {
+STIPPLE_WIDE static void addLeaves(const Around& around, const DiscPlane& plane, size_t begin, size_t end,
+                                   size_t stride, float error, Circles& to) {
     constexpr size_t kBlock = 32;
     alignas(64) std::array<float, kBlock> us, vs, rs;
     const glm::vec3 o(plane.place - around.corner);
@@ -91,6 +94,8 @@ void addLeaves(const Around& around, const DiscPlane& plane, size_t begin, size_
     }
 }
 
+namespace {
+
 /// Of a part of a node whose leaves are not at hand: its disc as far as its core.
 struct Patch {
     float u, v, w, core, rise, below, hole;
@@ -120,6 +125,45 @@ void addParts(const Around& around, const DiscPlane& plane, size_t begin, size_t
     }
 }
 
+constexpr size_t kRays = 32;
+/// Their directions; the first once more behind the last.
+struct Rays {
+    alignas(64) std::array<float, kRays + 1> c, s;
+    Rays() {
+        for (size_t k = 0; k <= kRays; ++k) {
+            const double a = 6.283185307179586 * static_cast<double>(k) / kRays;
+            c.at(k) = static_cast<float>(std::cos(a));
+            s.at(k) = static_cast<float>(std::sin(a));
+        }
+    }
+};
+const Rays kFan;
+
+}  // namespace
+
+/// `held`: how far out the disc is held between each ray and the next; farther where a circle around (u, v) begins
+/// there and reaches on. `power`: of the disc's centre, radius^2 - u^2 - v^2.
+STIPPLE_WIDE static void holdWith(float* held, float u, float v, float power) {
+    // A ray that misses the circle enters and leaves it at one place, which holds nothing.
+    alignas(64) std::array<float, kRays + 16> enter, leave;
+    for (size_t k = 0; k < kRays; ++k) {
+        const float along = u * kFan.c[k] + v * kFan.s[k], left = power + along * along;
+        const float half = std::sqrt(left > 0 ? left : 0);
+        enter[k] = along - half;
+        leave[k] = along + half;
+    }
+    enter[kRays] = enter[0];
+    leave[kRays] = leave[0];
+    for (size_t k = 0; k < kRays; ++k) {
+        const float from = enter[k] > enter[k + 1] ? enter[k] : enter[k + 1];
+        const float to = leave[k] < leave[k + 1] ? leave[k] : leave[k + 1];
+        const float reach = from <= held[k] ? to : 0;
+        held[k] = reach > held[k] ? reach : held[k];
+    }
+}
+
+namespace {
+
 /// Rays from the disc's centre, and how far out circles hold it between each two.
 class Fan {
   public:
@@ -130,22 +174,7 @@ class Fan {
             held_.fill(rim_);
             return;
         }
-        // A ray that misses the circle enters and leaves it at one place, which holds nothing.
-        alignas(64) std::array<float, kRays + 16> enter, leave;
-        for (size_t k = 0; k < kRays; ++k) {
-            const float along = u * kDirections.c[k] + v * kDirections.s[k], left = power + along * along;
-            const float half = std::sqrt(left > 0 ? left : 0);
-            enter[k] = along - half;
-            leave[k] = along + half;
-        }
-        enter[kRays] = enter[0];
-        leave[kRays] = leave[0];
-        for (size_t k = 0; k < kRays; ++k) {
-            const float from = enter[k] > enter[k + 1] ? enter[k] : enter[k + 1];
-            const float to = leave[k] < leave[k + 1] ? leave[k] : leave[k + 1];
-            const float reach = from <= held_[k] ? to : 0;
-            held_[k] = reach > held_[k] ? reach : held_[k];
-        }
+        holdWith(held_.data(), u, v, power);
     }
     /// Of what is still open between two rays, all that a single one of those circles holds. `circlesAt(u, v)`: which
     /// of them to try for that place of the rim, [first, last).
@@ -153,8 +182,7 @@ class Fan {
     void close(const Circles& circles, const CirclesAt& circlesAt) {
         for (size_t k = 0; k < kRays; ++k) {
             if (held_[k] >= rim_) continue;
-            const float c0 = kDirections.c[k], s0 = kDirections.s[k], c1 = kDirections.c[k + 1],
-                        s1 = kDirections.s[k + 1], in = held_[k];
+            const float c0 = kFan.c[k], s0 = kFan.s[k], c1 = kFan.c[k + 1], s1 = kFan.s[k + 1], in = held_[k];
             const auto [first, last] = circlesAt(0.5f * (c0 + c1) * radius_, 0.5f * (s0 + s1) * radius_);
             int32_t isClosed = 0;
             for (size_t i = first; i < last; ++i) {
@@ -173,8 +201,7 @@ class Fan {
         float most = 0;
         for (size_t k = 0; k < kRays; ++k) {
             if (held_[k] >= rim_) continue;
-            const float c0 = kDirections.c[k], s0 = kDirections.s[k], c1 = kDirections.c[k + 1],
-                        s1 = kDirections.s[k + 1], in = held_[k];
+            const float c0 = kFan.c[k], s0 = kFan.s[k], c1 = kFan.c[k + 1], s1 = kFan.s[k + 1], in = held_[k];
             float least = 3e38f;
             for (size_t i = 0; i < circles.count; ++i) {
                 const float u = circles.u[i], v = circles.v[i];
@@ -194,34 +221,36 @@ class Fan {
     float core() const { return least() * kNarrowest; }
 
   private:
-    static constexpr size_t kRays = 32;
     static constexpr float kNarrowest = 0.99518f;  ///< cosine of half the angle between two rays
     float least() const {
         float least = 3e38f;
         for (size_t k = 0; k < kRays; ++k) least = held_[k] < least ? held_[k] : least;
         return least;
     }
-    struct Directions {
-        alignas(64) std::array<float, kRays + 1> c, s;
-        Directions() {
-            for (size_t k = 0; k <= kRays; ++k) {
-                const double a = 6.283185307179586 * static_cast<double>(k) / kRays;
-                c.at(k) = static_cast<float>(std::cos(a));
-                s.at(k) = static_cast<float>(std::sin(a));
-            }
-        }
-    };
-    static const Directions kDirections;
     float radius_, rim_;
     alignas(64) std::array<float, kRays> held_{};
 };
-const Fan::Directions Fan::kDirections;
+
+}  // namespace
+
+namespace {
+
+bool isWithNormals(std::span<const PendingNode> nodes) {
+    const auto isNormal = [](uint32_t flags) { return (flags & shared::kFlagNoNormal) == 0; };
+    return std::any_of(nodes.begin(), nodes.end(), [&](const PendingNode& node) {
+        return std::any_of(node.records.begin(), node.records.end(),
+                           [&](const AggregateRecord& r) { return isNormal(r.flags); }) ||
+               std::any_of(node.leaf.colour.begin(), node.leaf.colour.end(),
+                           [&](uint32_t colour) { return isNormal(colour >> 24); });
+    });
+}
 
 }  // namespace
 
 Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* from,
                std::span<const PendingNode> children)
     : grid(g), leaves(from), corner(g.base), firstCell_(key >> g.clusterShift) {
+    if (!(leaves != nullptr ? leaves->hasNormals : isWithNormals(children))) return;
     if (leaves == nullptr) {
         std::vector<Key> keys;
         for (const PendingNode& child : children) {
@@ -384,24 +413,28 @@ Seen seenPart(const Around& around, const DiscPlane& plane, size_t i) {
     return {p.u, p.v, p.core, p.hole};
 }
 
-/// Of balls, which are leaves or stand for those below a part, the ones whose means are within a distance of a record.
+/// Balls, which are leaves or stand for those below a part: places beside a record; and of parts how many leaves each
+/// stands for and how far those lie from there, of leaves their radii.
 struct Balls {
-    double distance = 0;
-    glm::dvec3 sum{0};  ///< of the leaves' means beside the record
-    double weight = 0, least = 1e300;
-    glm::dvec3 off{0};  ///< of their common mean
-    double reach = 0;   ///< of the farthest leaf from that
-    /// How far a place of the record's ball is from the next of the leaves, at most: on its side of their common mean
-    /// there is one.
-    double farthest(double radius) const {
-        return weight == 0 ? 1e300 : std::hypot(radius + glm::length(off), reach) - least;
+    std::vector<double> x, y, z, away, weight, reach, radius;
+    size_t count() const { return x.size(); }
+    void resize(size_t count, bool areLeaves) {
+        for (auto* column : {&x, &y, &z, &away}) column->resize(count);
+        for (auto* column : {&weight, &reach}) column->resize(areLeaves ? 0 : count);
+        radius.resize(areLeaves ? count : 0);
+    }
+    void place(size_t k, const glm::dvec3& at) {
+        x[k] = at.x;
+        y[k] = at.y;
+        z[k] = at.z;
     }
 };
-/// `place`: beside the record; `reach`: how far the leaves that it stands for lie from there.
-struct Ball {
-    glm::dvec3 place;
-    double reach;
-    size_t first;  ///< of the sets of balls, of which each holds all of the one before
+/// Of four sets of balls a value each.
+using Fours = double __attribute__((vector_size(32), aligned(8), may_alias));
+using FourMasks = int64_t __attribute__((vector_size(32), aligned(8), may_alias));
+struct BallSets {
+    double distances[4];  ///< of their balls from the record, at most  NOLINT: a vector
+    double offX[4], offY[4], offZ[4], reach[4], least[4];  ///< of the leaves: NOLINT
 };
 
 }  // namespace
@@ -424,39 +457,75 @@ uint32_t coveringCode(const AggregateRecord& record, const Around& around, uint3
     return code;
 }
 
+/// Of the balls of each set the leaves' common mean, how far the farthest leaf is from that, and the least radius;
+/// 1e300 of a set without balls.
+STIPPLE_WIDE static void measureSets(Balls& balls, BallSets& sets) {
+    const size_t count = balls.count();
+    const double *const x = balls.x.data(), *const y = balls.y.data(), *const z = balls.z.data();
+    double* const away = balls.away.data();
+    for (size_t k = 0; k < count; ++k) away[k] = std::sqrt(x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
+    const bool areLeaves = balls.weight.empty();
+    const Fours distances = *reinterpret_cast<const Fours*>(sets.distances);
+    Fours sumX{}, sumY{}, sumZ{}, sum{}, least = Fours{} + 1e300;
+    for (size_t k = 0; k < count; ++k) {
+        // Nothing is added of what is not within.
+        const FourMasks within = Fours{} + away[k] <= distances;
+        const double weight = areLeaves ? 1 : balls.weight[k], radius = areLeaves ? balls.radius[k] : 0;
+        const Fours weights = reinterpret_cast<Fours>(reinterpret_cast<FourMasks>(Fours{} + weight) & within);
+        sumX += weights * x[k];
+        sumY += weights * y[k];
+        sumZ += weights * z[k];
+        sum += weights;
+        const Fours here = within ? Fours{} + radius : Fours{} + 1e300;
+        least = here < least ? here : least;
+    }
+    const Fours each = sum == 0 ? Fours{} + 1 : sum;
+    const Fours offX = sumX / each, offY = sumY / each, offZ = sumZ / each;
+    Fours reach{};
+    for (size_t k = 0; k < count; ++k) {
+        const FourMasks within = Fours{} + away[k] <= distances;
+        const Fours dx = x[k] - offX, dy = y[k] - offY, dz = z[k] - offZ;
+        Fours far = dx * dx + dy * dy + dz * dz;
+        if (!areLeaves)
+            for (size_t s = 0; s < 4; ++s) far[s] = std::sqrt(far[s]) + balls.reach[k];
+        far = reinterpret_cast<Fours>(reinterpret_cast<FourMasks>(far) & within);
+        reach = far > reach ? far : reach;
+    }
+    *reinterpret_cast<Fours*>(sets.offX) = offX;
+    *reinterpret_cast<Fours*>(sets.offY) = offY;
+    *reinterpret_cast<Fours*>(sets.offZ) = offZ;
+    *reinterpret_cast<Fours*>(sets.least) = least;
+    for (size_t s = 0; s < 4; ++s) sets.reach[s] = areLeaves ? std::sqrt(reach[s]) : reach[s];
+}
+
 double coveringErrorOfBall(const AggregateRecord& record, std::span<const AggregateRecord> parts,
                            const Leaves* leaves) {
-    const auto radius = static_cast<double>(record.radius);
-    std::array<Balls, 3> within;
-    for (size_t k = 0; const double share : {0.25, 0.5, 1.0}) within.at(k++).distance = share * radius * (1 + 1e-6);
-    thread_local std::vector<Ball> balls;
-    balls.clear();
-    // `least`: radius of the leaves at least, where they are known.
-    const auto add = [&](const glm::dvec3& mean, double weight, double reach, double least) {
-        const glm::dvec3 place = mean - record.place;
-        const double away = glm::length(place);
-        size_t first = 0;
-        while (first < within.size() && !(away <= within[first].distance)) ++first;
-        for (size_t k = first; k < within.size(); ++k) {
-            within[k].sum += weight * place;
-            within[k].weight += weight;
-            within[k].least = std::min(within[k].least, least);
+    thread_local Balls balls;
+    if (leaves != nullptr) {
+        balls.resize(record.count, true);
+        for (size_t k = 0; k < record.count; ++k) {
+            balls.place(k, leaves->points.at(record.first + k) - record.place);
+            balls.radius[k] = static_cast<double>(leaves->points.radius[record.first + k]);
         }
-        if (first < within.size()) balls.push_back({place, reach, first});
-    };
-    if (leaves != nullptr)
-        for (size_t at = record.first; at < size_t{record.first} + record.count; ++at)
-            add(leaves->points.at(at), 1, 0, static_cast<double>(leaves->points.radius[at]));
-    else
-        for (const AggregateRecord& p : parts)
-            add(p.mean, p.count, p.count == 1 ? 0.0 : glm::length(p.mean - p.place) + static_cast<double>(p.radius), 0);
-    for (Balls& b : within)
-        if (b.weight > 0) b.off = b.sum / b.weight;
-    for (const Ball& b : balls)
-        for (size_t k = b.first; k < within.size(); ++k)
-            within[k].reach = std::max(within[k].reach, glm::length(b.place - within[k].off) + b.reach);
+    } else {
+        balls.resize(parts.size(), false);
+        for (size_t k = 0; k < parts.size(); ++k) {
+            const AggregateRecord& p = parts[k];
+            balls.place(k, p.mean - record.place);
+            balls.weight[k] = p.count;
+            balls.reach[k] = p.count == 1 ? 0.0 : glm::length(p.mean - p.place) + static_cast<double>(p.radius);
+        }
+    }
+    const auto radius = static_cast<double>(record.radius);
+    const double all = radius * (1 + 1e-6);
+    BallSets sets{{0.25 * all, 0.5 * all, all, all}, {}, {}, {}, {}, {}};
+    measureSets(balls, sets);
+    // A place of the record's ball has one of the leaves on its side of their common mean.
     double error = 1e300;
-    for (const Balls& b : within) error = std::min(error, b.farthest(radius));
+    for (size_t s = 0; s < 3; ++s) {
+        const double off = glm::length(glm::dvec3(sets.offX[s], sets.offY[s], sets.offZ[s]));
+        if (sets.least[s] < 1e300) error = std::min(error, std::hypot(radius + off, sets.reach[s]) - sets.least[s]);
+    }
     return std::max(error, radius);
 }
 

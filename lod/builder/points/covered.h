@@ -18,8 +18,8 @@
 
 namespace stipple::lod {
 
-/// What of one node lies where: its points, or where those are not at hand its children's records. One at a time in a
-/// thread.
+/// What of one node lies where: its points, or where those are not at hand its children's records. Nothing where none
+/// has a normal: all records are balls, which are held against what they stand for alone. One at a time in a thread.
 class Around {
   public:
     /// `key`: of the node's corner; `leaves` may be null.

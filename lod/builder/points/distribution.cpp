@@ -134,7 +134,7 @@ Result<void> Distribution::announce() const {
     // Points near borders go to neighbours too: rarely all, now and then to more than one.
     uint64_t atBorders = 0;
     for (size_t c = 0; c < tree_->cells().size(); ++c)
-        atBorders += wanted_.wantGhosts && plan_.isBorder[c] != 0 ? tree_->cells()[c].count : 0;
+        atBorders += wanted_.wantGhosts && plan_.border[c] != 0 ? tree_->cells()[c].count : 0;
     return workspace_.announce(input_.points * layout_.bytes() + atBorders * layout_.ghostBytes(), progress_);
 }
 

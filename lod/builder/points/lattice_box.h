@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "lod/builder/octree/frame.h"
+
 namespace stipple::lod {
 
 /// Lattice box, both ends inside.
@@ -29,7 +31,7 @@ struct OncePerPlace {
     F f;
     mutable std::array<int64_t, 3> last{-1, -1, -1};
     void operator()(int64_t x, int64_t y, int64_t z) const {
-        if (last == std::array{x, y, z}) return;
+        if (isSame(last, {x, y, z})) return;
         last = {x, y, z};
         f(x, y, z);
     }

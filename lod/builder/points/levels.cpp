@@ -232,23 +232,22 @@ PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_
 /// proxy for both (an edge between two walls), so that flat parts get large discs and edges keep small errors.
 class ConeMerger {
   public:
-    template <typename CodeOf>
-    void merge(const Frame& frame, std::span<const AggregateRecord> parts, std::span<const AggregateValue> values,
-               const Around& around, const CodeOf& codeOf, PendingNode& out) {
-        const RecordGrid& grid = around.grid;
-        const AggregateRecord one = mergeAggregates(grid, parts, around.leaves, around);
-        if (!isSplit(grid, parts, one, around)) {
+    /// `one`: the record of all `count` parts, which partsOf() gives where they are asked for.
+    template <typename PartsOf, typename CodeOf>
+    void add(const Frame& frame, const AggregateRecord& one, size_t count, const PartsOf& partsOf,
+             std::span<const AggregateValue> values, const Around& around, const CodeOf& codeOf, PendingNode& out) {
+        if (!mayBeSplit(around.grid, count, one) || !isSplit(partsOf(), one, around)) {
             out.records.push_back(one);
-            for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = one.code;
-            mergeAttributes(frame, parts.size(), values, out);
+            for (size_t k = 0; k < count; ++k) codeOf(k) = one.code;
+            mergeAttributes(frame, count, values, out);
             return;
         }
-        for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = of_.at(side_[k]).code;
+        for (size_t k = 0; k < count; ++k) codeOf(k) = of_.at(side_[k]).code;
         for (uint8_t g = 0; g < 2; ++g) {
             out.records.push_back(of_.at(g));
             values_.clear();
             const size_t kinds = frame.attributes.size();
-            for (size_t k = 0; k < parts.size(); ++k)
+            for (size_t k = 0; k < count; ++k)
                 if (side_[k] == g)
                     values_.insert(values_.end(), values.begin() + static_cast<ptrdiff_t>(k * kinds),
                                    values.begin() + static_cast<ptrdiff_t>((k + 1) * kinds));
@@ -260,14 +259,16 @@ class ConeMerger {
     static constexpr int kWorthwhile = 8;       ///< codes of error (1/8 octaves) that two records must gain
     static constexpr double kGoodAsItIs = 0.5;  ///< radii: a disc with a smaller error is not split
 
-    bool isSplit(const RecordGrid& grid, std::span<const AggregateRecord> parts, const AggregateRecord& one,
-                 const Around& around) {
-        if (grid.errors.decode(one.code) < kGoodAsItIs * static_cast<double>(one.radius)) return false;
+    static bool mayBeSplit(const RecordGrid& grid, size_t count, const AggregateRecord& one) {
+        return count > 1 && (one.flags & shared::kFlagNoNormal) == 0 &&
+               grid.errors.decode(one.code) >= kGoodAsItIs * static_cast<double>(one.radius);
+    }
+    bool isSplit(std::span<const AggregateRecord> parts, const AggregateRecord& one, const Around& around) {
         if (!splitByNormals(parts, side_)) return false;
         for (auto& m : members_) m.clear();
         for (size_t k = 0; k < parts.size(); ++k) members_.at(side_[k]).push_back(parts[k]);
         for (size_t g = 0; g < 2; ++g) {
-            of_.at(g) = mergeAggregates(grid, members_.at(g), nullptr, around);
+            of_.at(g) = mergeAggregates(around.grid, members_.at(g), nullptr, around);
             if (of_.at(g).code + kWorthwhile > one.code) return false;
         }
         return true;
@@ -300,6 +301,20 @@ RecordGrid gridOf(const Frame& frame, const Node& node) {
     return grid;
 }
 
+/// How many clusters' cells hold records of these nodes.
+size_t cellsOf(std::span<const PendingNode> nodes, uint32_t clusterShift) {
+    size_t cells = 0;
+    for (const PendingNode& node : nodes) {
+        const auto add = [&](const auto& items, const auto& keyOf) {
+            for (size_t k = 0; k < items.size(); ++k)
+                cells += k == 0 || keyOf(items[k]) >> clusterShift != keyOf(items[k - 1]) >> clusterShift ? 1 : 0;
+        };
+        add(node.records, [](const AggregateRecord& r) { return r.key; });
+        add(node.leafKey, [](Key key) { return key; });
+    }
+    return cells;
+}
+
 /// What those above want to know of a node's records, whose leaves are not at hand there.
 void measureCores(std::span<AggregateRecord> records, const Around& around) {
     const uint32_t shift = around.grid.clusterShift;
@@ -324,6 +339,7 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
     thread_local std::vector<AggregateRecord> points;
     thread_local std::vector<AggregateValue> leafValues;
     thread_local ConeMerger cones;
+    out.records.reserve(cellsOf(children, grid.clusterShift) * 9 / 8);  // (some are split)
     for (PendingNode& child : children) {
         const bool isLeaf = child.node.isLeaf();
         out.node.childMask = static_cast<uint8_t>(
@@ -333,28 +349,34 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
         for (size_t begin = 0, end = 0; begin < count; begin = end) {
             const Key cell = keyAt(begin) >> grid.clusterShift;
             for (end = begin + 1; end < count && keyAt(end) >> grid.clusterShift == cell;) ++end;
-            std::span<const AggregateRecord> parts;
-            std::span<const AggregateValue> values;
-            if (isLeaf) {
+            const auto partsOf = [&]() -> std::span<const AggregateRecord> {
+                if (!isLeaf) return std::span(child.records).subspan(begin, end - begin);
                 points.clear();
-                leafValues.clear();
                 for (size_t k = begin; k < end; ++k) {
                     points.push_back(aggregateOfLeaf(child.leaf, k, child.leafKey[k]));
                     points.back().first += child.firstPoint;
+                }
+                return points;
+            };
+            std::span<const AggregateValue> values;
+            if (isLeaf) {
+                leafValues.clear();
+                for (size_t k = begin; k < end; ++k)
                     for (size_t a = 0; a < kinds; ++a)
                         leafValues.push_back(leafValue(frame.attributes[a], child.leaf.attributes[a].data() +
                                                                                 k * bytesOf(frame.attributes[a].type)));
-                }
-                parts = points;
                 values = leafValues;
             } else {
-                parts = std::span(child.records).subspan(begin, end - begin);
                 values = std::span(child.values).subspan(begin * kinds, (end - begin) * kinds);
             }
             const auto codeOf = [&](size_t k) -> uint8_t& {
                 return isLeaf ? child.leafParentCode[begin + k] : child.records[begin + k].parentCode;
             };
-            cones.merge(frame, parts, values, around, codeOf, out);
+            const AggregateRecord one =
+                isLeaf && leaves != nullptr
+                    ? mergeLeaves(grid, *leaves, child.firstPoint + begin, child.firstPoint + end, around)
+                    : mergeAggregates(grid, partsOf(), leaves, around);
+            cones.add(frame, one, end - begin, partsOf, values, around, codeOf, out);
         }
     }
     if (leaves == nullptr) measureCores(out.records, around);
@@ -394,8 +416,7 @@ bool isCoarse(const Frame& frame, const SortedPoints& from, size_t begin, size_t
     Place before{};
     for (size_t i = begin; i < end; ++i) {
         const Place place = from.points.place(i);
-        // (== of arrays is a call.)
-        if (i > begin && place[0] == before[0] && place[1] == before[1] && place[2] == before[2]) continue;
+        if (i > begin && isSame(place, before)) continue;
         ++different;
         for (size_t k = 0; k < places.size(); ++k) {
             const uint32_t shift = frame.shiftOf(std::min(level + kMostBelow.at(k).first, frame.keyLevels));
@@ -441,10 +462,12 @@ PendingNode subtreeOf(const Frame& frame, SortedPoints& from, size_t begin, size
 
 PendingNode makeSubtree(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level,
                         NodeBatch& batch) {
-    Leaves leaves{from.points, from.key, begin, std::vector<glm::vec3>(end - begin, glm::vec3(0))};
+    Leaves leaves{from.points, from.key, begin, std::vector<glm::vec3>(end - begin, glm::vec3(0)), false};
     for (size_t i = begin; i < end; ++i)
-        if ((from.points.colour[i] >> 24 & shared::kFlagNoNormal) == 0)
+        if ((from.points.colour[i] >> 24 & shared::kFlagNoNormal) == 0) {
             leaves.normal[i - begin] = shared::octDecode(from.points.normal[i]);
+            leaves.hasNormals = true;
+        }
     PendingNode root = subtreeOf(frame, from, begin, end, level, batch, leaves);
     const Around around(gridOf(frame, root.node), root.key, frame.shiftOf(level), &leaves, {});
     measureCores(root.records, around);

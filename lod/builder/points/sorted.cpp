@@ -54,26 +54,21 @@ std::vector<Keyed<K>> inOrder(const Frame& frame, size_t count, const PlaceOf& p
     return order;
 }
 
-template <typename T, typename K>
-void permute(std::vector<T>& values, const std::vector<Keyed<K>>& order) {
-    std::vector<T> sorted;
-    resizeHuge(sorted, order.size());
-    for (size_t i = 0; i < order.size(); ++i) sorted[i] = values[order[i].index];
-    values.swap(sorted);
-}
-
 /// Runs of one key: by place, then by all that the records hold. Calls keep(place's begin, end) for each place.
 template <typename K, typename PlaceOf, typename IsLess, typename Keep>
 void sortTies(std::vector<Keyed<K>>& order, const PlaceOf& placeOf, const IsLess& isLess, const Keep& keep) {
     for (size_t begin = 0; begin < order.size();) {
         size_t end = begin + 1;
         while (end < order.size() && order[end].key == order[begin].key) ++end;
-        const auto first = order.begin() + static_cast<ptrdiff_t>(begin),
-                   last = order.begin() + static_cast<ptrdiff_t>(end);
-        if (end - begin > 1) std::sort(first, last, isLess);
+        if (end - begin == 1) {
+            keep(begin, end);
+            begin = end;
+            continue;
+        }
+        std::sort(order.begin() + static_cast<ptrdiff_t>(begin), order.begin() + static_cast<ptrdiff_t>(end), isLess);
         for (size_t at = begin; at < end;) {
             size_t next = at + 1;
-            while (next < end && placeOf(order[next].index) == placeOf(order[at].index)) ++next;
+            while (next < end && isSame(placeOf(order[next].index), placeOf(order[at].index))) ++next;
             keep(at, next);
             at = next;
         }
@@ -89,39 +84,27 @@ template <typename K>
 SortResult sortBytesBy(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
                        bool mergeDuplicates) {
     SortResult result;
-    Points& p = result.sorted.points;
     const size_t stride = layout.bytes(), count = bytes.size() / stride;
-    layout.read(bytes.data(), count, p);
-    std::vector<Keyed<K>> order = inOrder<K>(frame, count, [&](size_t i) { return p.place(i); });
+    const auto recordAt = [&](size_t i) { return bytes.data() + i * stride; };
+    const auto placeOf = [&](size_t i) { return layout.placeAt(recordAt(i)); };
+    std::vector<Keyed<K>> order = inOrder<K>(frame, count, placeOf);
     const size_t most = mergeDuplicates ? 1 : kMostAtOnePlace;
-    std::vector<Keyed<K>> kept;
-    reserveHuge(kept, count);
-    const auto placeOf = [&](uint32_t i) { return p.place(i); };
+    size_t kept = 0;
     const auto isLess = [&](const Keyed<K>& a, const Keyed<K>& b) {
-        return std::memcmp(bytes.data() + a.index * stride, bytes.data() + b.index * stride, stride) < 0;
+        return std::memcmp(recordAt(a.index), recordAt(b.index), stride) < 0;
     };
     sortTies(order, placeOf, isLess, [&](size_t begin, size_t end) {
         const size_t stays = std::min(end - begin, most);
-        kept.insert(kept.end(), order.begin() + static_cast<ptrdiff_t>(begin),
-                    order.begin() + static_cast<ptrdiff_t>(begin + stays));
+        for (size_t i = begin; i < begin + stays; ++i) order[kept++] = order[i];
         (mergeDuplicates ? result.merged : result.tooMany) += end - begin - stays;
     });
-    permute(p.x, kept);
-    permute(p.y, kept);
-    permute(p.z, kept);
-    if (!p.high.empty()) permute(p.high, kept);
-    permute(p.colour, kept);
-    permute(p.normal, kept);
-    permute(p.radius, kept);
-    for (auto& column : p.attributes) {
-        const size_t width = count > 0 ? column.size() / count : 0;
-        std::vector<uint8_t> sorted(kept.size() * width);
-        for (size_t i = 0; i < kept.size(); ++i)
-            std::memcpy(sorted.data() + i * width, column.data() + kept[i].index * width, width);
-        column.swap(sorted);
+    SortedPoints& sorted = result.sorted;
+    layout.resize(sorted.points, kept);
+    resizeHuge(sorted.key, kept);
+    for (size_t i = 0; i < kept; ++i) {
+        layout.read(recordAt(order[i].index), i, sorted.points);
+        sorted.key[i] = order[i].key;
     }
-    result.sorted.key.resize(kept.size());
-    for (size_t i = 0; i < kept.size(); ++i) result.sorted.key[i] = kept[i].key;
     return result;
 }
 
@@ -168,28 +151,25 @@ namespace {
 template <typename K>
 Places sortGhostsBy(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
                     bool mergeDuplicates) {
-    const size_t count = bytes.size() / layout.ghostBytes();
-    Points from;
-    layout.readGhosts(bytes.data(), count, from);
-    std::vector<Keyed<K>> order = inOrder<K>(frame, count, [&](size_t i) { return from.place(i); });
+    const size_t stride = layout.ghostBytes(), count = bytes.size() / stride;
+    const auto ghostAt = [&](size_t i) { return bytes.data() + i * stride; };
+    const auto placeOf = [&](size_t i) { return layout.placeAt(ghostAt(i)); };
+    std::vector<Keyed<K>> order = inOrder<K>(frame, count, placeOf);
     const size_t most = mergeDuplicates ? 1 : kMostAtOnePlace;
     Places out;
-    const auto bytesOf = [&](const Keyed<K>& k) { return bytes.data() + k.index * layout.ghostBytes(); };
-    sortTies(
-        order, [&](uint32_t i) { return from.place(i); },
-        [&](const Keyed<K>& a, const Keyed<K>& b) {
-            return std::memcmp(bytesOf(a), bytesOf(b), layout.ghostBytes()) < 0;
-        },
-        [&](size_t begin, size_t end) {
-            for (size_t i = begin; i < std::min(end, begin + most); ++i) {
-                const uint32_t at = order[i].index;
-                out.key.push_back(order[i].key);
-                out.x.push_back(from.x[at]);
-                out.y.push_back(from.y[at]);
-                out.z.push_back(from.z[at]);
-                if (!from.high.empty()) out.high.push_back(from.high[at]);
-            }
-        });
+    const auto isLess = [&](const Keyed<K>& a, const Keyed<K>& b) {
+        return std::memcmp(ghostAt(a.index), ghostAt(b.index), stride) < 0;
+    };
+    sortTies(order, placeOf, isLess, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < std::min(end, begin + most); ++i) {
+            const Place place = placeOf(order[i].index);
+            out.key.push_back(order[i].key);
+            out.x.push_back(static_cast<uint32_t>(place[0]));
+            out.y.push_back(static_cast<uint32_t>(place[1]));
+            out.z.push_back(static_cast<uint32_t>(place[2]));
+            if (layout.isWide()) out.high.push_back(highOf(place));
+        }
+    });
     return out;
 }
 
