@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kNeighbours = 6;
 constexpr size_t kProbes = 24;  // their median is within a tenth of that of all
 constexpr float kPi = 3.14159265f;
-constexpr size_t kLanesOfSpacing = 16;
+constexpr size_t kLanesOfSpacing = 16, kBeside = 4 * kLanesOfSpacing;
 constexpr float kRoundedUp = 1 + 1e-6f;  // more than what floats may be off, here and there
 
 }  // namespace
@@ -50,27 +50,35 @@ float recordSpacing(std::span<const shared::PointRecord> records) {
     const size_t probes = std::min(kProbes, n);
     std::array<int64_t, kProbes> areas{};
     for (size_t p = 0; p < probes; ++p) {
-        const shared::PointRecord& from = records[(p * 2654435761u + 12345u) % n];
+        const size_t index = (p * 2654435761u + 12345u) % n;
+        const shared::PointRecord& from = records[index];
         const auto x = int64_t{shared::recordX(from)}, y = int64_t{shared::recordY(from)},
                    z = int64_t{shared::recordZ(from)};
         const float place[3] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
         std::array<int64_t, kNeighbours + 1> nearest{};  // itself comes first
         nearest.fill(std::numeric_limits<int64_t>::max());
         float limit = std::numeric_limits<float>::max();
-        for (size_t first = 0;
-             (first = blockWithin({xs.data(), ys.data(), zs.data()}, first, padded, place, limit)) < padded;
-             first += kLanesOfSpacing) {
-            for (size_t k = first; k < std::min(n, first + kLanesOfSpacing); ++k) {
-                const int64_t dx = shared::recordX(records[k]) - x, dy = shared::recordY(records[k]) - y,
-                              dz = shared::recordZ(records[k]) - z;
-                const int64_t squared = dx * dx + dy * dy + dz * dz;
-                if (squared >= nearest.back()) continue;
-                size_t at = kNeighbours;
-                for (; at > 0 && nearest.at(at - 1) > squared; --at) nearest.at(at) = nearest.at(at - 1);
-                nearest.at(at) = squared;
+        const auto scan = [&](size_t first, size_t end) {
+            for (; (first = blockWithin({xs.data(), ys.data(), zs.data()}, first, end, place, limit)) < end;
+                 first += kLanesOfSpacing) {
+                for (size_t k = first; k < std::min(n, first + kLanesOfSpacing); ++k) {
+                    const int64_t dx = shared::recordX(records[k]) - x, dy = shared::recordY(records[k]) - y,
+                                  dz = shared::recordZ(records[k]) - z;
+                    const int64_t squared = dx * dx + dy * dy + dz * dz;
+                    if (squared >= nearest.back()) continue;
+                    size_t at = kNeighbours;
+                    for (; at > 0 && nearest.at(at - 1) > squared; --at) nearest.at(at) = nearest.at(at - 1);
+                    nearest.at(at) = squared;
+                }
+                limit = static_cast<float>(nearest.back()) * kRoundedUp;
             }
-            limit = static_cast<float>(nearest.back()) * kRoundedUp;
-        }
+        };
+        // Where it stands itself first: records lie there that are near, and most others are too far then.
+        const size_t own = index / kLanesOfSpacing * kLanesOfSpacing, begin = own - std::min(own, kBeside),
+                     end = std::min(padded, own + kBeside);
+        scan(begin, end);
+        scan(0, begin);
+        scan(end, padded);
         areas.at(p) = nearest.back();
     }
     const auto middle = areas.begin() + static_cast<ptrdiff_t>(probes / 2);

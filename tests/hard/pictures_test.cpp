@@ -103,9 +103,13 @@ TEST_F(HardPictures, DiscsAtGrazingAnglesAreAtTheDepthsOfTheirPlanes) {
                     const dvec3 c = (d.position - eye) / 1.0;
                     const double facing = std::abs(glm::dot(d.normal, glm::normalize(c)));
                     const double cx = 0.5 * kSize + 150 * c.x / -c.z, cy = 0.5 * kSize - 150 * c.y / -c.z;
-                    if (cx >= 0 && cy >= 0 && cx < kSize && cy < kSize)
-                        isCentre[static_cast<size_t>(cy) * kSize + static_cast<size_t>(cx)] = 1;
                     const double slab = d.radius * std::sqrt(std::max(1 - d.normal.z * d.normal.z, 0.0));
+                    // The pixel that holds a centre shows a disc that it may miss, no farther off than its rim.
+                    if (cx >= 0 && cy >= 0 && cx < kSize && cy < kSize) {
+                        const size_t i = static_cast<size_t>(cy) * kSize + static_cast<size_t>(cx);
+                        const double z = double{image.depth[i]} / scale;
+                        if (std::abs(z + c.z) <= slab * (1 + 1e-3) + 0x1p-22 * -c.z) isCentre[i] = 1;
+                    }
                     for (size_t i = 0; i < image.depth.size(); ++i) {
                         const double z = double{image.depth[i]} / scale;
                         if (z <= 0 || isKnown[i] != 0) continue;
