@@ -178,6 +178,30 @@ TEST(Coordinates, OnePointFarAwayChangesNothing) {
     }
 }
 
+/// Errors of coarse records are measured against points whose coordinates take more than 32 bits.
+TEST(Coordinates, LevelsOfWhatTakesMoreThan32BitsHaveTheErrorsOfTheirSize) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const glm::dvec3 centre(431'234.5, 5'321'987.25, 512.125);
+    std::vector<TestPoint> points = objectsAt({centre}, 40'000);
+    points.push_back({centre - glm::dvec3(1e9, 1e10, 1e8), glm::vec3(0, 0, 1), 0xffffff, 0});
+    test::writePly(folder / "a.ply", points, false);
+    test::build({folder / "a.ply"}, folder / "a.stipple", *executor);
+    const auto store = opened(folder / "a.stipple");
+    const Hierarchy& h = store->hierarchy;
+    size_t wide = 0, measured = 0;
+    for (const Node& n : h.nodes) {
+        const glm::dvec3 place = h.origin + h.unit * n.centre;
+        if (n.isLeaf() || glm::length(place - centre) + h.unit * n.radius > 2) continue;
+        ++measured;
+        wide += std::max({n.centre.x, n.centre.y, n.centre.z}) > 0x1p32 ? 1 : 0;
+        // Whatever it holds is drawn as a disc that reaches across it: no farther off than from side to side.
+        EXPECT_LE(h.errors.decode(n.errorCode), 2 * 1.1 * n.radius) << "level " << int{n.level};
+    }
+    EXPECT_GT(measured, 3u);
+    EXPECT_EQ(wide, measured);
+}
+
 /// The largest radius of a leaf disc within `reach` of a place.
 double largestRadius(const Store& store, const glm::dvec3& place, double reach) {
     double largest = 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "engine/base/huge_buffer.h"
 #include "shaders/shared/record.h"
@@ -69,9 +70,14 @@ BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) 
                 const uint8_t level = std::max(cells[other].level, cells[i].level);
                 plan.border[i] = std::max(plan.border[i], static_cast<uint8_t>(level + 1));
             };
-            for (auto other = first; other != end; ++other) look(static_cast<size_t>(other - cells.begin()));
-            if (const uint32_t larger = first == end ? tree.cellOf(key) : CellTree::kNone; larger != CellTree::kNone)
-                look(larger);
+            if (first == end) {
+                if (const uint32_t larger = tree.cellOf(key); larger != CellTree::kNone) look(larger);
+                continue;
+            }
+            // (Buckets are runs of cells: of the first and the last of them, so are those between.)
+            const auto from = static_cast<size_t>(first - cells.begin()), to = static_cast<size_t>(end - cells.begin());
+            if (plan.ofCell[from] == plan.ofCell[i] && plan.ofCell[to - 1] == plan.ofCell[i]) continue;
+            for (size_t other = from; other < to; ++other) look(other);
         }
     }
     return plan;
@@ -182,10 +188,8 @@ Result<void> Distributor::put(int worker, uint32_t bucket, size_t kind, size_t c
 
 Result<void> Distributor::send(size_t slot, Buffer& buffer) {
     BucketBytes& bucket = *buckets_[slot / 2];
-    STIPPLE_TRY(
-        (slot % 2 == kPoints ? bucket.points : bucket.ghosts).append(std::span(buffer.bytes).first(buffer.used)));
-    buffer.used = 0;
-    return {};
+    const size_t bytes = std::exchange(buffer.used, 0);
+    return (slot % 2 == kPoints ? bucket.points : bucket.ghosts).append(std::span(buffer.bytes).first(bytes));
 }
 
 Result<void> Distributor::flush() {
@@ -225,22 +229,22 @@ void Distributor::ghosts(uint32_t cell, const Place& place, std::vector<uint32_t
                       ownSize = int64_t{1} << (frame_.rootLog2 - own);
         const std::array<int64_t, 3> p{static_cast<int64_t>(place[0]), static_cast<int64_t>(place[1]),
                                        static_cast<int64_t>(place[2])};
-        // Steps along each axis that lead out of a cell of this size, or nowhere.
+        // Along each axis itself, and the places a step away that lie out of a cell of this size.
         std::array<std::array<int64_t, 3>, 3> places{};
-        std::array<size_t, 3> steps{};
+        std::array<size_t, 3> counts{};
         bool isNear = false;
         for (size_t a = 0; a < 3; ++a) {
             const int64_t local = p[a] & (size - 1), inOwn = p[a] & (ownSize - 1);
-            const auto add = [&](int64_t by) { places[a][steps[a]++] = p[a] + by; };
+            const auto add = [&](int64_t by) { places[a][counts[a]++] = p[a] + by; };
             if (local < reach) add(-reach);
             add(0);
             if (local + reach >= size) add(reach);
             isNear = isNear || inOwn < reach || inOwn + reach >= ownSize;
         }
         if (!isNear) return;  // nor is it within less
-        for (size_t k = 0; k < steps[0] * steps[1] * steps[2]; ++k) {
-            const std::array<int64_t, 3> q{places[0][k % steps[0]], places[1][k / steps[0] % steps[1]],
-                                           places[2][k / (steps[0] * steps[1])]};
+        for (size_t k = 0; k < counts[0] * counts[1] * counts[2]; ++k) {
+            const std::array<int64_t, 3> q{places[0][k % counts[0]], places[1][k / counts[0] % counts[1]],
+                                           places[2][k / (counts[0] * counts[1])]};
             if (isSame(q, p)) continue;
             const uint32_t other = cellAt(frame_, tree_, q);
             if (other == CellTree::kNone) continue;

@@ -143,7 +143,7 @@ const Rays kFan;
 
 /// `held`: how far out the disc is held between each ray and the next; farther where a circle around (u, v) begins
 /// there and reaches on. `power`: of the disc's centre, radius^2 - u^2 - v^2.
-STIPPLE_WIDE static void holdWith(float* held, float u, float v, float power) {
+STIPPLE_WIDE static void holdBetweenRays(float* held, float u, float v, float power) {
     // A ray that misses the circle enters and leaves it at one place, which holds nothing.
     alignas(64) std::array<float, kRays + 16> enter, leave;
     for (size_t k = 0; k < kRays; ++k) {
@@ -174,7 +174,7 @@ class Fan {
             held_.fill(rim_);
             return;
         }
-        holdWith(held_.data(), u, v, power);
+        holdBetweenRays(held_.data(), u, v, power);
     }
     /// Of what is still open between two rays, all that a single one of those circles holds. `circlesAt(u, v)`: which
     /// of them to try for that place of the rim, [first, last).
@@ -231,10 +231,6 @@ class Fan {
     alignas(64) std::array<float, kRays> held_{};
 };
 
-}  // namespace
-
-namespace {
-
 bool isWithNormals(std::span<const PendingNode> nodes) {
     const auto isNormal = [](uint32_t flags) { return (flags & shared::kFlagNoNormal) == 0; };
     return std::any_of(nodes.begin(), nodes.end(), [&](const PendingNode& node) {
@@ -250,6 +246,7 @@ bool isWithNormals(std::span<const PendingNode> nodes) {
 Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* from,
                std::span<const PendingNode> children)
     : grid(g), leaves(from), corner(g.base), firstCell_(key >> g.clusterShift) {
+    cellRuns.resize(kMostCells);
     if (!(leaves != nullptr ? leaves->hasNormals : isWithNormals(children))) return;
     if (leaves == nullptr) {
         std::vector<Key> keys;
@@ -270,9 +267,10 @@ Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* fro
     for (auto* column : {&x, &y, &z, &nx, &ny, &nz, &radius}) column->resize(count);
     for (size_t k = 0; k < count; ++k) {
         const Points& p = leaves->points;
-        x[k] = static_cast<float>(p.x[first + k] - corner.x);
-        y[k] = static_cast<float>(p.y[first + k] - corner.y);
-        z[k] = static_cast<float>(p.z[first + k] - corner.z);
+        const glm::vec3 place(p.at(first + k) - corner);
+        x[k] = place.x;
+        y[k] = place.y;
+        z[k] = place.z;
         radius[k] = p.radius[first + k];
         const glm::vec3& n = leaves->normalOf(first + k);
         nx[k] = n.x;
@@ -283,7 +281,6 @@ Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* fro
 }
 
 void Around::number(std::span<const Key> keys) {
-    cellRuns.resize(kMostCells);
     for (size_t i = 0; i < keys.size();) {
         const Key cell = keys[i] >> grid.clusterShift;
         const auto begin = static_cast<uint32_t>(i);
@@ -430,11 +427,12 @@ struct Balls {
     }
 };
 /// Of four sets of balls a value each.
-using Fours = double __attribute__((vector_size(32), aligned(8), may_alias));
-using FourMasks = int64_t __attribute__((vector_size(32), aligned(8), may_alias));
+using Fours [[gnu::vector_size(32), gnu::may_alias]] = double;
+using FourMasks [[gnu::vector_size(32), gnu::may_alias]] = int64_t;
 struct BallSets {
-    double distances[4];  ///< of their balls from the record, at most  NOLINT: a vector
-    double offX[4], offY[4], offZ[4], reach[4], least[4];  ///< of the leaves: NOLINT
+    using Values = double[4];                           // NOLINT(modernize-avoid-c-arrays): a vector
+    alignas(32) Values distances;                       ///< of their balls from the record, at most
+    alignas(32) Values offX, offY, offZ, reach, least;  ///< of the leaves
 };
 
 }  // namespace

@@ -55,8 +55,8 @@ class Around {
 /// Code of an error not below that of `code` which all places of the record's disc keep to the nearest leaf of its
 /// node. Of a record without a normal: `code`.
 uint32_t coveringCode(const AggregateRecord& record, const Around& around, uint32_t code);
-/// The same of records without a normal, which are balls: lattice units, at least the radius. `parts` as in
-/// mergeAggregates.
+/// The same of records without a normal, which are balls: lattice units, at least the radius. `parts`: what they stand
+/// for, where `leaves` is null.
 double coveringErrorOfBall(const AggregateRecord& record, std::span<const AggregateRecord> parts, const Leaves* leaves);
 /// Sets `core` and `hole` of a record. `isAll`: no other record stands for leaves in its cell.
 void measureCore(AggregateRecord& record, const Around& around, bool isAll);

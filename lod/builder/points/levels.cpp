@@ -420,9 +420,9 @@ bool isCoarse(const Frame& frame, const SortedPoints& from, size_t begin, size_t
         ++different;
         for (size_t k = 0; k < places.size(); ++k) {
             const uint32_t shift = frame.shiftOf(std::min(level + kMostBelow.at(k).first, frame.keyLevels));
-            const bool isSame = i > begin && from.key[i] >> shift == from.key[i - 1] >> shift;
-            places.at(k) = isSame ? places.at(k) + 1 : 1;
-            cells += k == 0 && !isSame ? 1 : 0;
+            const bool isBeside = i > begin && from.key[i] >> shift == from.key[i - 1] >> shift;
+            places.at(k) = isBeside ? places.at(k) + 1 : 1;
+            cells += k == 0 && !isBeside ? 1 : 0;
             if (places.at(k) > kMostBelow.at(k).second) return true;
         }
         uint64_t apart = 0;

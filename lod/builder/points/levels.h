@@ -65,7 +65,7 @@ struct Leaves {
     std::span<const Key> key;  ///< of all points
     size_t first = 0;
     std::vector<glm::vec3> normal;
-    bool hasNormals = false;  ///< any of them
+    bool hasNormals;  ///< any of them
     const glm::vec3& normalOf(size_t point) const { return normal[point - first]; }
 };
 

@@ -54,7 +54,8 @@ std::vector<Keyed<K>> inOrder(const Frame& frame, size_t count, const PlaceOf& p
     return order;
 }
 
-/// Runs of one key: by place, then by all that the records hold. Calls keep(place's begin, end) for each place.
+/// Runs of one key: by place, then by all that the records hold. Calls keep(place's begin, end) for each place,
+/// which may write what lies before its end.
 template <typename K, typename PlaceOf, typename IsLess, typename Keep>
 void sortTies(std::vector<Keyed<K>>& order, const PlaceOf& placeOf, const IsLess& isLess, const Keep& keep) {
     for (size_t begin = 0; begin < order.size();) {
