@@ -21,6 +21,21 @@ struct RecordGrid {
 /// was rounded to fp32 gets its own code again.
 uint32_t radiusCodeUp(double radius, double edge);
 double radiusOf(uint32_t code, double edge);
+/// The same of one radius after the other, of which many are equal.
+class RadiusCodes {
+  public:
+    explicit RadiusCodes(double edge) : edge_(edge) {}
+    uint32_t upOf(float radius) {
+        if (radius != radius_) code_ = radiusCodeUp(static_cast<double>(radius), edge_);
+        radius_ = radius;
+        return code_;
+    }
+
+  private:
+    double edge_;
+    float radius_ = -1;
+    uint32_t code_ = 0;
+};
 
 /// Point i as a record that stands for itself.
 AggregateRecord aggregateOfLeaf(const Points& points, size_t i, Key key);

@@ -131,7 +131,7 @@ void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
     std::vector<std::vector<uint8_t>> streams;
     for (const AttributeInfo& a : frame.attributes) streams.emplace_back(count * bytesOf(a.type));
     const uint64_t size = uint64_t{1} << (frame.rootLog2 - node.level);
-    const double edge = frame.cellSize(node.level);
+    RadiusCodes radii(frame.cellSize(node.level));
     for (size_t k = 0; k < count; ++k) {
         const size_t at = order.next[isLeaf ? pending.leafParentCode[k] : pending.records[k].parentCode]++;
         for (size_t a = 0; a < kinds; ++a) {
@@ -147,7 +147,7 @@ void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
             continue;
         }
         const Points& p = pending.leaf;
-        const uint32_t radius = radiusCodeUp(static_cast<double>(p.radius[k]), edge);
+        const uint32_t radius = radii.upOf(p.radius[k]);
         const Place place = p.place(k);
         const auto steps = [&](size_t a) { return coordinate(place.at(a), size, node.stepShift); };
         chunk.records[at] = {steps(0) | steps(1) << 16, steps(2) | radius << 16, p.normal[k], p.colour[k]};
@@ -189,10 +189,9 @@ void innerSphere(const Frame& frame, std::span<const PendingNode> children, Pend
 PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level) {
     PendingNode out;
     const double edge = frame.cellSize(level);
-    for (size_t i = begin; i < end; ++i) {
-        const uint32_t code = radiusCodeUp(static_cast<double>(from.points.radius[i]), edge);
-        from.points.radius[i] = static_cast<float>(radiusOf(code, edge));
-    }
+    RadiusCodes codes(edge);
+    for (size_t i = begin; i < end; ++i)
+        from.points.radius[i] = static_cast<float>(radiusOf(codes.upOf(from.points.radius[i]), edge));
     out.firstPoint = static_cast<uint32_t>(begin);
     const auto copy = [&](auto& to, const auto& values) {
         to.assign(values.begin() + static_cast<ptrdiff_t>(begin), values.begin() + static_cast<ptrdiff_t>(end));
