@@ -336,9 +336,11 @@ Result<Planned> PointStages::planMemory() {
     const bool isOnDisk = 2 * all + (workers + 1) * kSubtreePoints * pointBytes() > room && small > room + fixed;
     bufferBytes_ = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
     bucketPoints_ = bucketOf(isOnDisk ? room / 2 : room / 4);
-    // Enough of them for all threads, but none smaller than a subtree.
+    // Enough of them for all threads, but none smaller than a subtree; where nothing is estimated, and no bucket has to
+    // see what lies in others, more, which takes less memory.
     const uint64_t ranks = settings_.ranks == nullptr ? 1 : static_cast<uint64_t>(settings_.ranks->count());
-    bucketPoints_ = std::max<uint64_t>(std::min<uint64_t>(bucketPoints_, n / (6 * workers * ranks)), kSubtreePoints);
+    bucketPoints_ = std::max<uint64_t>(
+        std::min<uint64_t>(bucketPoints_, n / ((wantsEstimates() ? 6u : 32u) * workers * ranks)), kSubtreePoints);
     return Planned{isOnDisk || settings_.ranks != nullptr};
 }
 
