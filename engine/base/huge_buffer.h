@@ -43,7 +43,7 @@ void reserveHuge(std::vector<T>& of, size_t count) {
     of.reserve(count);
     const auto first = reinterpret_cast<uintptr_t>(of.data());
     const uintptr_t begin = (first + kHuge - 1) / kHuge * kHuge, end = (first + count * sizeof(T)) / kHuge * kHuge;
-    if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+    if (begin < end) ::madvise(reinterpret_cast<char*>(of.data()) + (begin - first), end - begin, MADV_HUGEPAGE);
 }
 /// Resizes a vector in that way: what it held is only kept where there was room.
 template <typename T>
