@@ -92,14 +92,25 @@ tl::unexpected<Error> vulkanError(VkResult result, const std::string& what) {
     return fail(kind, fmt::format("{} (VkResult {})", what, static_cast<int>(result)), "Vulkan", "try --device cpu");
 }
 
+namespace {
+
+/// What `create` makes of `info`, or "no WHAT".
+template <typename Handle, typename Info>
+Result<Handle> make(VkResult (*create)(VkDevice, const Info*, const VkAllocationCallbacks*, Handle*),
+                    const Device& device, const Info& info, const char* what) {
+    Handle handle = VK_NULL_HANDLE;
+    if (const VkResult r = create(device.device, &info, nullptr, &handle); r != VK_SUCCESS)
+        return vulkanError(r, fmt::format("no {}", what));
+    return handle;
+}
+
+}  // namespace
+
 Result<VkCommandPool> makeCommandPool(const Device& device, uint32_t family) {
     VkCommandPoolCreateInfo info{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
     info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
     info.queueFamilyIndex = family;
-    VkCommandPool pool = VK_NULL_HANDLE;
-    if (const VkResult r = vkCreateCommandPool(device.device, &info, nullptr, &pool); r != VK_SUCCESS)
-        return vulkanError(r, "no command pool");
-    return pool;
+    return make(vkCreateCommandPool, device, info, "command pool");
 }
 
 Result<VkCommandBuffer> makeCommands(const Device& device, VkCommandPool pool) {
@@ -114,21 +125,14 @@ Result<VkCommandBuffer> makeCommands(const Device& device, VkCommandPool pool) {
 }
 
 Result<VkFence> makeFence(const Device& device) {
-    const VkFenceCreateInfo info{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-    VkFence fence = VK_NULL_HANDLE;
-    if (const VkResult r = vkCreateFence(device.device, &info, nullptr, &fence); r != VK_SUCCESS)
-        return vulkanError(r, "no fence");
-    return fence;
+    return make(vkCreateFence, device, VkFenceCreateInfo{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO}, "fence");
 }
 
 Result<VkQueryPool> makeTimestamps(const Device& device, uint32_t count) {
     VkQueryPoolCreateInfo info{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
     info.queryType = VK_QUERY_TYPE_TIMESTAMP;
     info.queryCount = count;
-    VkQueryPool queries = VK_NULL_HANDLE;
-    if (const VkResult r = vkCreateQueryPool(device.device, &info, nullptr, &queries); r != VK_SUCCESS)
-        return vulkanError(r, "no query pool");
-    return queries;
+    return make(vkCreateQueryPool, device, info, "query pool");
 }
 
 Result<void> submitCommands(VkQueue queue, VkCommandBuffer commands, SemaphoreValue after, SemaphoreValue then,
