@@ -12,6 +12,7 @@
 #include "engine/cpu/effect_room.h"
 #include "engine/cpu/hidden_nodes.h"
 #include "engine/cpu/kernels.h"
+#include "engine/cpu/pixel_regions.h"
 #include "engine/cpu/pyramid.h"
 #include "engine/render/backend.h"
 #include "engine/render/chunk_table.h"
@@ -59,6 +60,7 @@ struct Frame {
     // Plane::visibility. It is clear between frames: resolve resets each entry that it has read.
     HugeBuffer<uint64_t> visibility;
     std::vector<uint8_t> runs;  ///< of `visibility`
+    PixelRegions regions;       ///< of the picture
     size_t visibilityPixels = 0;
 
     // Where the draws' records are.

@@ -100,6 +100,14 @@ struct SplatBlock {
     alignas(64) uint32_t alone[kSize];   ///< kAlone, or 0
 };
 
+/// What each record of a block of points claims.
+struct ProjectedBlock {
+    static constexpr uint32_t kSize = shared::kRecordsPerBlock;
+    alignas(64) uint32_t pixel[kSize];  ///< its index; ~0u: none; kWidePixel: it is a wide disc
+    alignas(64) uint32_t depth[kSize];  ///< bits
+    int firstX, lastX, firstY, lastY;   ///< px; all pixels are among these; none: the first behind the last
+};
+
 struct BlockSource {
     const shared::PointRecord* records;  ///< first record of the block
     const shared::DrawNode* node;
@@ -355,11 +363,9 @@ enum class RowContent { nothing, points, other };
 struct Kernels {
     const char* name;
     const Kernels* orthographic;
-    /// Pixel index (or ~0u) and depth bits of up to 256 records.
-    /// `besideToo`: also those beside the picture whose discs reach in; wide discs give kWidePixel.
+    /// Up to 256 records. `besideToo`: also those beside the picture whose discs reach in; wide discs give kWidePixel.
     void (*projectBlock)(const shared::FrameConstants& f, const shared::DrawNode& node,
-                         const shared::PointRecord* records, uint32_t count, bool besideToo, uint32_t* pixel,
-                         uint32_t* depth);
+                         const shared::PointRecord* records, uint32_t count, bool besideToo, ProjectedBlock& to);
     /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are
     /// empty.
     /// `planes`: from the row's first pixel on; null without triangles, 0 where none is seen.

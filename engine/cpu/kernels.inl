@@ -78,7 +78,7 @@ template <bool hasTubes, bool hasMaterials>
 template <bool besideToo, bool wideToo>
 [[gnu::always_inline]] inline void projectRecords(const FrameConstants& frame, const DrawNode& drawNode,
                                                   const PointRecord* __restrict records, uint32_t count,
-                                                  uint32_t* __restrict pixel, uint32_t* __restrict depth) {
+                                                  ProjectedBlock& __restrict to) {
     const FrameConstants f = frame;
     const DrawNode node = drawNode;
     const float width = float(f.width), height = float(f.height);
@@ -93,6 +93,8 @@ template <bool besideToo, bool wideToo>
     const float wideShare = wideRadius(f.width, f.height) / focal;
     const uint stride = f.width, errorCode = node.errorCode, octantMask = node.octantMask;
     const NormalAxes m = normalAxes(node);
+    uint32_t *__restrict const pixels = to.pixel, *__restrict const depths = to.depth;
+    alignas(64) int places[kRecordsPerBlock];
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const PointRecord r{words[4 * i], words[4 * i + 1], words[4 * i + 2], words[4 * i + 3]};
@@ -125,24 +127,40 @@ template <bool besideToo, bool wideToo>
         const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (facing < 0.0f);
         const bool keep = inside & fine & seen;
         const int ix = int(keep ? atX : 0.0f), iy = int(keep ? atY : 0.0f);
-        pixel[i] = keep ? uint(iy) * stride + uint(ix) : ~0u;
+        places[i] = keep ? iy << 16 | ix : -1;
+        uint32_t pixel = keep ? uint(iy) * stride + uint(ix) : ~0u;
         if (wideToo) {
             const float wide = isWideDisc(recordFlags(r), cz, edge * radiusFractionFast(recordRadiusCode(r)), wideShare,
                                           nearPlane, lens);
-            pixel[i] = wide > 0.5f ? (fine & seen ? kWidePixel : ~0u) : pixel[i];
+            pixel = wide > 0.5f ? (fine & seen ? kWidePixel : ~0u) : pixel;
         }
-        depth[i] = floatBitsToUint(key);
+        pixels[i] = pixel;
+        depths[i] = floatBitsToUint(key);
     }
+    int firstX = 0xffff, lastX = -1, firstY = 0xffff, lastY = -1;
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const int x = places[i] & 0xffff, y = (places[i] >> 16) & 0xffff;
+        const int mostX = places[i] < 0 ? -1 : x, mostY = places[i] < 0 ? -1 : y;
+        firstX = x < firstX ? x : firstX;
+        lastX = mostX > lastX ? mostX : lastX;
+        firstY = y < firstY ? y : firstY;
+        lastY = mostY > lastY ? mostY : lastY;
+    }
+    to.firstX = firstX;
+    to.lastX = lastX;
+    to.firstY = firstY;
+    to.lastY = lastY;
 }
 
 void projectBlock(const FrameConstants& f, const DrawNode& node, const PointRecord* records, uint32_t count,
-                  bool besideToo, uint32_t* pixel, uint32_t* depth) {
+                  bool besideToo, ProjectedBlock& to) {
     if ((node.octantMask & kNodeWide) != 0u && besideToo)
-        projectRecords<true, true>(f, node, records, count, pixel, depth);
+        projectRecords<true, true>(f, node, records, count, to);
     else if (besideToo)
-        projectRecords<true, false>(f, node, records, count, pixel, depth);
+        projectRecords<true, false>(f, node, records, count, to);
     else
-        projectRecords<false, false>(f, node, records, count, pixel, depth);
+        projectRecords<false, false>(f, node, records, count, to);
 }
 
 #include "engine/cpu/sample.inl"

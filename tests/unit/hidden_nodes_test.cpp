@@ -186,10 +186,10 @@ class Claims {
   private:
     void addPoints(const shared::DrawNode& node, const shared::PointRecord* records, uint32_t count, bool besideToo,
                    Claimed& to) const {
-        alignas(64) std::array<uint32_t, 256> pixel{}, depth{};
-        k_.projectBlock(f_, node, records, count, besideToo, pixel.data(), depth.data());
+        cpu::ProjectedBlock block;
+        k_.projectBlock(f_, node, records, count, besideToo, block);
         for (uint32_t i = 0; i < count; ++i)
-            if (pixel[i] < cpu::kWidePixel) to.pixels.emplace_back(pixel[i], depth[i]);
+            if (block.pixel[i] < cpu::kWidePixel) to.pixels.emplace_back(block.pixel[i], block.depth[i]);
     }
     void addDiscs(const shared::DrawNode& node, const shared::PointRecord* records, uint32_t count, Claimed& to) const {
         cpu::SplatBlock b;

@@ -151,13 +151,14 @@ TEST(KernelFormulas, PixelsAreThoseOfProjection) {
     forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
         Rng rng(2);
         std::vector<PointRecord> records(kRecordsPerBlock);
-        std::vector<uint32_t> pixel(kRecordsPerBlock), depth(kRecordsPerBlock);
+        cpu::ProjectedBlock block;
         const Lens lens = frameLens(f);
         size_t drawn = 0, apart = 0;
         for (int round = 0; round < 200; ++round) {
             const DrawNode node = randomNode(rng);
             for (PointRecord& r : records) r = randomRecord(rng);
-            k.projectBlock(f, node, records.data(), kRecordsPerBlock, false, pixel.data(), depth.data());
+            k.projectBlock(f, node, records.data(), kRecordsPerBlock, false, block);
+            int firstX = 640, lastX = -1, firstY = 480, lastY = -1;
             for (uint32_t i = 0; i < kRecordsPerBlock; ++i) {
                 const PointRecord r = records[i];
                 const vec3 c = recordPlace(node, r);
@@ -170,11 +171,27 @@ TEST(KernelFormulas, PixelsAreThoseOfProjection) {
                                     dot(nodeNormal(node, octDirection(r.normal)), sightTo(lens, c)) < 0.0f;
                 const uint32_t expected =
                     isFine && isIn && isSeen ? uint32_t(int(y)) * f.width + uint32_t(int(x)) : ~0u;
-                apart += pixel[i] != expected;
-                if (pixel[i] == ~0u || expected == ~0u) continue;
+                apart += block.pixel[i] != expected;
+                if (block.pixel[i] != ~0u) {
+                    const int column = static_cast<int>(block.pixel[i] % f.width),
+                              line = static_cast<int>(block.pixel[i] / f.width);
+                    firstX = std::min(firstX, column);
+                    lastX = std::max(lastX, column);
+                    firstY = std::min(firstY, line);
+                    lastY = std::max(lastY, line);
+                }
+                if (block.pixel[i] == ~0u || expected == ~0u) continue;
                 ++drawn;
-                EXPECT_LE(ulpsBetween(std::bit_cast<float>(depth[i]), c.z), 2);
+                EXPECT_LE(ulpsBetween(std::bit_cast<float>(block.depth[i]), c.z), 2);
             }
+            if (lastX < 0) {
+                EXPECT_LT(block.lastX, block.firstX);
+                continue;
+            }
+            EXPECT_EQ(block.firstX, firstX);
+            EXPECT_EQ(block.lastX, lastX);
+            EXPECT_EQ(block.firstY, firstY);
+            EXPECT_EQ(block.lastY, lastY);
         }
         EXPECT_GT(drawn, 1000u);
         EXPECT_LE(apart, drawn / 2000) << "at the edges of pixels and seen edge-on one rounding decides";

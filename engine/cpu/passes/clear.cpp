@@ -16,6 +16,7 @@ void resize(Frame& frame) {
     resizeHuge(frame.image->linear, frame.wantsRest ? pixels * 3 : 0);
     if (frame.hasPyramid || frame.hasSmooth) frame.pyramid.resize(w, h, frame.constants.hasMaterials != 0);
     if (!frame.hasPyramid) frame.shownRows.resize(size_t{(w + kTile - 1) / kTile} * h);
+    frame.regions.resize(w, h);
     if (frame.visibilityPixels == pixels) return;  // it is clear whatever its shape
     frame.visibilityPixels = pixels;
     frame.visibility.assign(pixels, shared::kNoKey);
