@@ -34,7 +34,7 @@ class TileLists {
         ranges_.resize(splats_.size());
         counts_.assign(chunks_, 0);
         entries_.assign(chunks_, 0);
-        if (countsTiles) frame_.tileEnds.assign(size_t{chunks_} * columns_ * rows_, 0);
+        if (countsTiles) frame_.tileEnds.assign(chunks_ * pitch(rows_), 0);
         frame_.executor.parallelFor(chunks_, 1, [&](size_t begin, size_t end) {
             SplatBlock placed;
             for (size_t c = begin; c < end; ++c) {
@@ -81,7 +81,7 @@ class TileLists {
     /// Calls use(place) for each disc of a chunk: where it is in Frame::placedSplats and Frame::splatTiles.
     template <typename Use>
     void forDiscs(size_t chunk, const Use& use) const {
-        const size_t first = chunk * blocksPerChunk_ * shared::kRecordsPerBlock;
+        const size_t first = firstOf(chunk);
         for (size_t at = first; at < first + counts_[chunk]; ++at) use(at);
     }
     /// Calls use(tile) for each tile of the picture, shared out among threads.
@@ -97,7 +97,7 @@ class TileLists {
         const auto tile = [](int pixel, uint32_t size) {
             return static_cast<uint16_t>(static_cast<uint32_t>(pixel) / size);
         };
-        const size_t first = chunk * blocksPerChunk_ * shared::kRecordsPerBlock + counts_[chunk];
+        const size_t first = firstOf(chunk) + counts_[chunk];
         // (At hand: after each store they would be read again.)
         PlacedSplat* splat = splats_.data() + first;
         TileRange* range = ranges_.data() + first;
@@ -105,8 +105,15 @@ class TileLists {
         uint32_t* colour = isBlended ? frame_.placedColours.data() + first : nullptr;
         const uint32_t alone = isBlended ? 0u : ~0u;
         uint64_t entries = 0;
+        // (Which are kept is as good as random: they are found without branches.)
+        alignas(64) uint32_t places[SplatBlock::kSize];
+        uint32_t kept = 0;
         for (uint32_t i = 0; i < count; ++i) {
-            if (b.keep[i] == 0) continue;
+            places[kept] = i;
+            kept += b.keep[i] != 0 ? 1u : 0u;
+        }
+        for (uint32_t k = 0; k < kept; ++k) {
+            const uint32_t i = places[k];
             if (isBlended) *colour++ = b.colour[i];
             *splat++ = {b.cx[i], b.cy[i], b.cz[i],     b.nx[i],
                         b.ny[i], b.nz[i], b.radius[i], (firstId + i) | (b.alone[i] & alone)};
@@ -114,12 +121,37 @@ class TileLists {
                       tile(b.lastX[i], SplatTile::kWidth), tile(b.lastY[i], SplatTile::kHeight)};
             entries += range++->tiles();
         }
-        const auto kept = static_cast<uint32_t>(splat - (splats_.data() + first));
         counts_[chunk] += kept;
         entries_[chunk] += entries;
         if (!isCounted_) return;
-        uint32_t* const ends = frame_.tileEnds.data() + chunk * rows_ * columns_;
-        forTilesOf(first, first + kept, 0, rows_, [&](size_t at, uint32_t) { ++ends[at]; });
+        countInto(frame_.tileEnds.data() + chunk * pitch(rows_), first, first + kept, 0, rows_);
+    }
+
+    /// Entries of a chunk in tables of the tiles of so many rows: beyond the last there is one more row and tile.
+    size_t pitch(uint32_t rows) const { return size_t{columns_} * (rows + 1u) + 1u; }
+    /// Nearly all discs reach one tile or two each way, which is as good as random: no branches on that.
+    static bool isSmall(const TileRange& r) { return r.lastX - r.firstX <= 1 && r.lastY - r.firstY <= 1; }
+
+    /// Adds to the counts of tiles.
+    void countInto(uint32_t* counts, size_t first, size_t last, uint32_t firstRow, uint32_t lastRow) const {
+        const auto one = [counts](size_t tile, uint32_t) { ++counts[tile]; };
+        if (lastRow - firstRow < rows_) return forTilesOf(first, last, firstRow, lastRow, one);
+        const TileRange* const ranges = ranges_.data();
+        const size_t columns = columns_;
+        for (size_t at = first; at < last; ++at) {
+            const TileRange r = ranges[at];
+            if (!isSmall(r)) {
+                forTilesOf(at, at + 1, firstRow, lastRow, one);
+                continue;
+            }
+            const auto right = static_cast<uint32_t>(r.lastX - r.firstX),
+                       below = static_cast<uint32_t>(r.lastY - r.firstY);
+            uint32_t* const count = counts + r.firstY * columns + r.firstX;
+            count[0] += 1u;
+            count[1] += right;
+            count[columns] += below;
+            count[columns + 1] += right & below;
+        }
     }
 
     /// Calls use(tile, place of the disc) for each disc of [first, last) and each tile of these rows that it reaches;
@@ -138,40 +170,37 @@ class TileLists {
         }
     }
 
-    /// The same of a chunk.
-    template <typename Use>
-    void forEntries(size_t chunk, uint32_t firstRow, uint32_t lastRow, const Use& use) const {
-        const size_t first = chunk * blocksPerChunk_ * shared::kRecordsPerBlock;
-        forTilesOf(first, first + counts_[chunk], firstRow, lastRow, use);
-    }
+    /// Of a chunk's discs.
+    size_t firstOf(size_t chunk) const { return chunk * blocksPerChunk_ * shared::kRecordsPerBlock; }
 
     /// Rows [firstRow, lastRow) of tiles, of which `sum` is the length of the lists.
     template <typename DrawTile>
     void drawRows(uint32_t firstRow, uint32_t lastRow, uint64_t sum, const DrawTile& drawTile) {
-        const size_t tiles = size_t{columns_} * (lastRow - firstRow), chunks = chunks_;
+        const size_t tiles = size_t{columns_} * (lastRow - firstRow), chunks = chunks_,
+                     pitch = this->pitch(lastRow - firstRow);
         std::vector<uint32_t>& ends = frame_.tileEnds;  // of each chunk and tile: how many, then where they end
         if (!isCounted_ || lastRow - firstRow < rows_) {
-            ends.assign(chunks * tiles, 0);
+            ends.assign(chunks * pitch, 0);
             frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
                 for (size_t c = begin; c < end; ++c)
-                    forEntries(c, firstRow, lastRow, [&](size_t tile, uint32_t) { ++ends[c * tiles + tile]; });
+                    countInto(ends.data() + c * pitch, firstOf(c), firstOf(c) + counts_[c], firstRow, lastRow);
             });
         }
         std::vector<uint32_t> starts(tiles + 1, 0);
         for (size_t c = 0; c < chunks; ++c)
-            for (size_t t = 0; t < tiles; ++t) starts[t + 1] += ends[c * tiles + t];
+            for (size_t t = 0; t < tiles; ++t) starts[t + 1] += ends[c * pitch + t];
         for (size_t t = 0; t < tiles; ++t) starts[t + 1] += starts[t];
         std::vector<uint32_t> next(starts.begin(), starts.end() - 1);
         for (size_t c = 0; c < chunks; ++c)
             for (size_t t = 0; t < tiles; ++t) {
-                const uint32_t count = ends[c * tiles + t];
-                ends[c * tiles + t] = next[t];
+                const uint32_t count = ends[c * pitch + t];
+                ends[c * pitch + t] = next[t];
                 next[t] += count;
             }
         std::vector<uint32_t>& places = frame_.tilePlaces;
         places.resize(std::max(places.size(), static_cast<size_t>(sum)));
         frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
-            for (size_t c = begin; c < end; ++c) putInto(places.data(), ends.data() + c * tiles, c, firstRow, lastRow);
+            for (size_t c = begin; c < end; ++c) putInto(places.data(), ends.data() + c * pitch, c, firstRow, lastRow);
         });
         frame_.executor.parallelFor(tiles, 4, [&](size_t begin, size_t end) {
             for (size_t t = begin; t < end; ++t)
@@ -183,7 +212,31 @@ class TileLists {
 
     /// `next`: of each tile, where its next entry goes.
     void putInto(uint32_t* places, uint32_t* next, size_t chunk, uint32_t firstRow, uint32_t lastRow) const {
-        forEntries(chunk, firstRow, lastRow, [&](size_t tile, uint32_t at) { places[next[tile]++] = at; });
+        const size_t first = firstOf(chunk), last = first + counts_[chunk];
+        const auto one = [places, next](size_t tile, uint32_t at) { places[next[tile]++] = at; };
+        if (lastRow - firstRow < rows_) return forTilesOf(first, last, firstRow, lastRow, one);
+        const TileRange* const ranges = ranges_.data();
+        const size_t columns = columns_;
+        uint32_t nowhere = 0;
+        for (size_t at = first; at < last; ++at) {
+            const TileRange r = ranges[at];
+            if (!isSmall(r)) {
+                forTilesOf(at, at + 1, firstRow, lastRow, one);
+                continue;
+            }
+            const auto right = static_cast<uint32_t>(r.lastX - r.firstX),
+                       below = static_cast<uint32_t>(r.lastY - r.firstY);
+            uint32_t* const to = next + r.firstY * columns + r.firstX;
+            const auto put = [&](size_t tile, uint32_t isReached) {
+                uint32_t* const place = isReached != 0u ? places + to[tile] : &nowhere;
+                *place = static_cast<uint32_t>(at);
+                to[tile] += isReached;
+            };
+            put(0, 1u);
+            put(1, right);
+            put(columns, below);
+            put(columns + 1, right & below);
+        }
     }
 
     SplatTile tileAt(size_t tile) const {
