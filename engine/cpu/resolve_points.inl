@@ -323,17 +323,21 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
         seen[count] = i;
         count += (visibility[i] != kNoKey) | (hasSeconds && seconds.kinds[i] == kSecondFront) ? 1u : 0u;
     }
-    // Records lie anywhere in memory: all of the row are asked for before the first is read.
+    // Blocks, their records and their nodes lie anywhere in memory: all of the row are asked for before the first is read.
     for (uint32_t k = 0; k < count; ++k) {
         const uint32_t i = seen[k];
         const bool isSecond = hasSeconds && seconds.kinds[i] == kSecondFront;
         const uint64_t key = isSecond ? seconds.at(i)->key : visibility[i];
         visibility[i] = kNoKey;
         keys[k] = key;
-        const BlockSource* const block =
-            filtered == nullptr && isPointKey(key, firstBlock) ? blocks + keyBlock(key) : nullptr;
-        of[k] = block;
-        if (block != nullptr) __builtin_prefetch(block->records + keyLane(key));
+        of[k] = filtered == nullptr && isPointKey(key, firstBlock) ? blocks + keyBlock(key) : nullptr;
+        __builtin_prefetch(of[k]);
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        if (of[k] == nullptr) continue;
+        __builtin_prefetch(of[k]->records + keyLane(keys[k]));
+        __builtin_prefetch(of[k]->node);
+        __builtin_prefetch(reinterpret_cast<const char*>(of[k]->node) + 64);
     }
     for (uint32_t k = 0; k < count; ++k) {
         const uint32_t i = seen[k];
