@@ -130,7 +130,10 @@ class TileLists {
     /// Entries of a chunk in tables of the tiles of so many rows: beyond the last there is one more row and tile.
     size_t pitch(uint32_t rows) const { return size_t{columns_} * (rows + 1u) + 1u; }
     /// Nearly all discs reach one tile or two each way, which is as good as random: no branches on that.
-    static bool isSmall(const TileRange& r) { return r.lastX - r.firstX <= 1 && r.lastY - r.firstY <= 1; }
+    /// (Of discs that are not to be drawn the last tile is before the first: not these.)
+    static bool isSmall(const TileRange& r) {
+        return static_cast<uint32_t>(r.lastX - r.firstX) <= 1u && static_cast<uint32_t>(r.lastY - r.firstY) <= 1u;
+    }
 
     /// Adds to the counts of tiles.
     void countInto(uint32_t* counts, size_t first, size_t last, uint32_t firstRow, uint32_t lastRow) const {
