@@ -27,7 +27,7 @@ struct Chunks {
     const lod::Chunk& at(streaming::ChunkKey key) const { return chunks.at(key); }
 };
 
-/// The tiles that a disc reaches.
+/// The tiles that a disc reaches; none if the last is before the first.
 struct TileRange {
     uint16_t firstX, firstY, lastX, lastY;
     uint64_t tiles() const { return uint64_t{lastX - firstX + 1u} * (lastY - firstY + 1u); }

@@ -127,7 +127,7 @@ template <bool besideToo, bool wideToo>
         const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (facing < 0.0f);
         const bool keep = inside & fine & seen;
         const int ix = int(keep ? atX : 0.0f), iy = int(keep ? atY : 0.0f);
-        places[i] = keep ? iy << 16 | ix : -1;
+        places[i] = keep ? iy << 16 | ix : -1;  // (pictures have at most 16384 px each way)
         uint32_t pixel = keep ? uint(iy) * stride + uint(ix) : ~0u;
         if (wideToo) {
             const float wide = isWideDisc(recordFlags(r), cz, edge * radiusFractionFast(recordRadiusCode(r)), wideShare,

@@ -20,8 +20,9 @@ class PixelRegions {
         columns_ = columns;
     }
 
-    /// Those that meet a box of pixels, while it lives. All threads take them in the same order, and one that holds
-    /// some takes no others: nobody waits for who waits.
+    /// Those that meet a box of pixels, while it lives; a thread has one at a time. All take them in the same order, so
+    /// that they never wait in a circle. (Measured with two threads: on many, blocks that reach much of the picture
+    /// wait more.)
     class Held {
       public:
         Held(PixelRegions& of, int firstX, int lastX, int firstY, int lastY)
@@ -43,11 +44,14 @@ class PixelRegions {
       private:
         static void wait(const std::atomic<bool>& isHeld) {
             constexpr int kSpins = 256;  // then its holder may have been interrupted
-            for (int k = 0; isHeld.load(std::memory_order_relaxed); ++k) {
+            for (int k = 0; isHeld.load(std::memory_order_relaxed);) {
 #ifdef __x86_64__
                 __builtin_ia32_pause();
 #endif
-                if (k >= kSpins) std::this_thread::yield();
+                if (k < kSpins)
+                    ++k;
+                else
+                    std::this_thread::yield();
             }
         }
         template <typename Use>

@@ -323,7 +323,7 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
         seen[count] = i;
         count += (visibility[i] != kNoKey) | (hasSeconds && seconds.kinds[i] == kSecondFront) ? 1u : 0u;
     }
-    // Blocks, their records and their nodes lie anywhere in memory: all of the row are asked for before the first is read.
+    // Blocks, their records and their nodes lie anywhere in memory: all of the row are asked for before any is read.
     for (uint32_t k = 0; k < count; ++k) {
         const uint32_t i = seen[k];
         const bool isSecond = hasSeconds && seconds.kinds[i] == kSecondFront;
@@ -331,9 +331,9 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
         visibility[i] = kNoKey;
         keys[k] = key;
         of[k] = filtered == nullptr && isPointKey(key, firstBlock) ? blocks + keyBlock(key) : nullptr;
-        __builtin_prefetch(of[k]);
+        if (filtered == nullptr) __builtin_prefetch(of[k]);
     }
-    for (uint32_t k = 0; k < count; ++k) {
+    for (uint32_t k = 0; filtered == nullptr && k < count; ++k) {
         if (of[k] == nullptr) continue;
         __builtin_prefetch(of[k]->records + keyLane(keys[k]));
         __builtin_prefetch(of[k]->node);

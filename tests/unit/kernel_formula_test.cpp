@@ -198,6 +198,32 @@ TEST(KernelFormulas, PixelsAreThoseOfProjection) {
     });
 }
 
+TEST(KernelFormulas, NoPixelIsClaimedBesideTheBoxOfItsBlock) {
+    forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
+        Rng rng(12);
+        std::vector<PointRecord> records(kRecordsPerBlock);
+        cpu::ProjectedBlock block;
+        size_t claimed = 0, wide = 0;
+        for (int round = 0; round < 200; ++round) {
+            DrawNode node = randomNode(rng);
+            if (round % 2 == 1) node.octantMask |= kNodeWide;
+            for (PointRecord& r : records) r = randomRecord(rng);
+            const uint32_t count = round % 3 == 0 ? kRecordsPerBlock : static_cast<uint32_t>(round) % kRecordsPerBlock;
+            k.projectBlock(f, node, records.data(), count, true, block);
+            for (uint32_t i = 0; i < count; ++i) {
+                wide += block.pixel[i] == cpu::kWidePixel;
+                if (block.pixel[i] >= cpu::kWidePixel) continue;
+                ++claimed;
+                const int x = static_cast<int>(block.pixel[i] % f.width),
+                          y = static_cast<int>(block.pixel[i] / f.width);
+                ASSERT_TRUE(block.firstX <= x && x <= block.lastX && block.firstY <= y && y <= block.lastY);
+            }
+        }
+        EXPECT_GT(claimed, 1'000u);
+        EXPECT_GT(wide, 0u);
+    });
+}
+
 TEST(KernelFormulas, TexelsArePackedAndUnpackedAsOne) {
     forKernels([](const cpu::Kernels& k, const FrameConstants&) {
         Rng rng(3);

@@ -1,5 +1,4 @@
 // Points into the visibility buffer: one pixel each, wide discs by rays.
-#include <array>
 #include <atomic>
 
 #include "engine/cpu/passes/passes.h"
@@ -37,34 +36,45 @@ void findWide(const Frame& frame, uint32_t b, uint32_t count, const ProjectedBlo
     }
 }
 
-/// The nearest of each pixel stays. Which records claim one and which are in front is as good as random, so that
-/// nothing here branches on it: a branch that is guessed wrongly waits for the pixel. That takes plain stores, and
-/// those the pixels to be this thread's own (atomic operations: 1.8 times as long).
-void claimPixels(const ProjectedBlock& block, uint32_t b, uint32_t count, const Visibility& to) {
-    constexpr uint32_t kAhead = 48;  // pixels are scattered over 16 MB: they are asked for in time
-    // (Plain arrays and pointers: of std::array's references GCC makes branches.)
-    alignas(64) uint32_t claims[ProjectedBlock::kSize + kAhead];
+constexpr uint32_t kAhead =
+    48;  // pixels are scattered over 16 MB: so many records before they are read they are asked for
+/// The records of a block that claim a pixel. (Plain arrays: of std::array's references GCC makes branches.)
+struct Claims {
+    uint32_t count = 0;
+    alignas(64) uint32_t of[ProjectedBlock::kSize + kAhead];
+};
+/// Which do is as good as random: they are found without branches.
+void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
     uint32_t n = 0;
     for (uint32_t i = 0; i < count; ++i) {
-        claims[n] = i;
+        to.of[n] = i;
         n += block.pixel[i] < kWidePixel ? 1u : 0u;
     }
-    if (n == 0) return;
-    for (uint32_t k = 0; k < kAhead; ++k) claims[n + k] = claims[0];
-    for (uint32_t k = 0; k < n; ++k) {
-        const uint32_t i = claims[k], pixel = block.pixel[i];
-        __builtin_prefetch(&to.keys[block.pixel[claims[k + kAhead]]], 1);
+    for (uint32_t k = 0; n > 0 && k < kAhead; ++k) to.of[n + k] = to.of[0];
+    to.count = n;
+}
+/// The nearest of each pixel stays. Which is in front is as good as random, too: a branch that is guessed wrongly would
+/// wait for the pixel. So stores are plain, and the pixels have to be this thread's own (PixelRegions).
+void claimPixels(const ProjectedBlock& block, uint32_t b, const Claims& claims, const Visibility& to) {
+    for (uint32_t k = 0; k < claims.count; ++k) {
+        const uint32_t i = claims.of[k], pixel = block.pixel[i];
+        __builtin_prefetch(&to.keys[block.pixel[claims.of[k + kAhead]]], 1);
         const uint64_t key = shared::visibilityKey(block.depth[i], shared::drawId(b, i)), old = to.keys[pixel];
         to.keys[pixel] = key < old ? key : old;
-        std::atomic_ref<uint8_t>(to.runs[pixel >> Visibility::kRunBits]).store(1, std::memory_order_relaxed);
+        const std::atomic_ref<uint8_t> run(to.runs[pixel >> Visibility::kRunBits]);  // of several regions
+        if (run.load(std::memory_order_relaxed) == 0) run.store(1, std::memory_order_relaxed);
     }
 }
 
-/// The processor looks ahead by itself, but not from one page to the next, which a block is.
-void askForRecords(const BlockSource& block) {
-    constexpr size_t kBytes = sizeof(shared::PointRecord) * shared::kRecordsPerBlock, kLine = 64;
+/// The processor looks ahead by itself, but not beyond a page, and a block is as large as one.
+void askForRecords(const BlockSource& block, uint32_t count) {
+    constexpr size_t kLine = 64;
     const auto* const first = reinterpret_cast<const char*>(block.records);
-    for (size_t at = 0; at < kBytes; at += kLine) __builtin_prefetch(first + at, 0, 2);
+    for (size_t at = 0; at < count * sizeof(shared::PointRecord); at += kLine) __builtin_prefetch(first + at, 0, 2);
+}
+uint32_t countOf(const Frame& frame, uint32_t block) {
+    return std::min(shared::kRecordsPerBlock,
+                    frame.blocks[block].node->count - frame.draws->points().blocks[block].first);
 }
 
 /// `besideToo`: of each node.
@@ -72,20 +82,21 @@ void projectBlocks(Frame& frame, std::span<const uint32_t> blocks, const std::ve
                    WideDiscs& found) {
     frame.executor.parallelFor(blocks.size(), 32, [&](size_t begin, size_t end) {
         ProjectedBlock block;
+        Claims claims;
         std::vector<shared::WideDisc> mine;
         for (size_t k = begin; k < end; ++k) {
             const uint32_t b = blocks[k];
             const shared::DrawNode& node = *frame.blocks[b].node;
             if (frame.isSmoothing && (node.octantMask & shared::kNodeSmooth) == 0) continue;
-            const shared::DrawBlock& drawn = frame.draws->points().blocks[b];
-            const uint32_t count = std::min(shared::kRecordsPerBlock, node.count - drawn.first);
-            frame.k.projectBlock(frame.constants, node, frame.blocks[b].records, count, besideToo[drawn.node] != 0,
-                                 block);
+            const uint32_t count = countOf(frame, b);
+            frame.k.projectBlock(frame.constants, node, frame.blocks[b].records, count,
+                                 besideToo[frame.draws->points().blocks[b].node] != 0, block);
             if ((node.octantMask & shared::kNodeWide) != 0) findWide(frame, b, count, block, mine);
-            if (k + 1 < end) askForRecords(frame.blocks[blocks[k + 1]]);
-            if (block.lastX < block.firstX) continue;
+            if (k + 1 < end) askForRecords(frame.blocks[blocks[k + 1]], countOf(frame, blocks[k + 1]));
+            findClaims(block, count, claims);
+            if (claims.count == 0) continue;
             const PixelRegions::Held held(frame.regions, block.firstX, block.lastX, block.firstY, block.lastY);
-            claimPixels(block, b, count, frame.visible());
+            claimPixels(block, b, claims, frame.visible());
         }
         if (!mine.empty()) found.push(std::move(mine));
     });
