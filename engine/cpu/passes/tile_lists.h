@@ -137,7 +137,25 @@ class TileLists {
 
     /// Adds to the counts of tiles.
     void countInto(uint32_t* counts, size_t first, size_t last, uint32_t firstRow, uint32_t lastRow) const {
-        const auto one = [counts](size_t tile, uint32_t) { ++counts[tile]; };
+        forEntries(first, last, firstRow, lastRow,
+                   [counts](size_t tile, uint32_t, uint32_t isReached) { counts[tile] += isReached; });
+    }
+    /// `next`: of each tile, where its next entry goes.
+    void putInto(uint32_t* places, uint32_t* next, size_t chunk, uint32_t firstRow, uint32_t lastRow) const {
+        uint32_t nowhere = 0;
+        forEntries(firstOf(chunk), firstOf(chunk) + counts_[chunk], firstRow, lastRow,
+                   [places, next, &nowhere](size_t tile, uint32_t at, uint32_t isReached) {
+                       uint32_t* const place = isReached != 0u ? places + next[tile] : &nowhere;
+                       *place = at;
+                       next[tile] += isReached;
+                   });
+    }
+
+    /// As forTilesOf, but calls use(tile, place of the disc, 1), and of small discs also with 0 for tiles beside
+    /// theirs.
+    template <typename Use>
+    void forEntries(size_t first, size_t last, uint32_t firstRow, uint32_t lastRow, const Use& use) const {
+        const auto one = [&use](size_t tile, uint32_t at) { use(tile, at, 1u); };
         if (lastRow - firstRow < rows_) return forTilesOf(first, last, firstRow, lastRow, one);
         const TileRange* const ranges = ranges_.data();
         const size_t columns = columns_;
@@ -148,12 +166,12 @@ class TileLists {
                 continue;
             }
             const auto right = static_cast<uint32_t>(r.lastX - r.firstX),
-                       below = static_cast<uint32_t>(r.lastY - r.firstY);
-            uint32_t* const count = counts + r.firstY * columns + r.firstX;
-            count[0] += 1u;
-            count[1] += right;
-            count[columns] += below;
-            count[columns + 1] += right & below;
+                       below = static_cast<uint32_t>(r.lastY - r.firstY), disc = static_cast<uint32_t>(at);
+            const size_t tile = r.firstY * columns + r.firstX;
+            use(tile, disc, 1u);
+            use(tile + 1, disc, right);
+            use(tile + columns, disc, below);
+            use(tile + columns + 1, disc, right & below);
         }
     }
 
@@ -211,35 +229,6 @@ class TileLists {
                     drawTile(splats_.data(), places.data() + starts[t], starts[t + 1] - starts[t],
                              tileAt(t + size_t{firstRow} * columns_));
         });
-    }
-
-    /// `next`: of each tile, where its next entry goes.
-    void putInto(uint32_t* places, uint32_t* next, size_t chunk, uint32_t firstRow, uint32_t lastRow) const {
-        const size_t first = firstOf(chunk), last = first + counts_[chunk];
-        const auto one = [places, next](size_t tile, uint32_t at) { places[next[tile]++] = at; };
-        if (lastRow - firstRow < rows_) return forTilesOf(first, last, firstRow, lastRow, one);
-        const TileRange* const ranges = ranges_.data();
-        const size_t columns = columns_;
-        uint32_t nowhere = 0;
-        for (size_t at = first; at < last; ++at) {
-            const TileRange r = ranges[at];
-            if (!isSmall(r)) {
-                forTilesOf(at, at + 1, firstRow, lastRow, one);
-                continue;
-            }
-            const auto right = static_cast<uint32_t>(r.lastX - r.firstX),
-                       below = static_cast<uint32_t>(r.lastY - r.firstY);
-            uint32_t* const to = next + r.firstY * columns + r.firstX;
-            const auto put = [&](size_t tile, uint32_t isReached) {
-                uint32_t* const place = isReached != 0u ? places + to[tile] : &nowhere;
-                *place = static_cast<uint32_t>(at);
-                to[tile] += isReached;
-            };
-            put(0, 1u);
-            put(1, right);
-            put(columns, below);
-            put(columns + 1, right & below);
-        }
     }
 
     SplatTile tileAt(size_t tile) const {
