@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <cstring>
 #include <utility>
 
 #include "engine/base/file.h"
@@ -10,6 +11,17 @@
 namespace stipple {
 
 Result<void> Spill::append(std::span<const uint8_t> bytes) {
+    if (region_ != nullptr) {
+        const uint64_t at = bytes_.fetch_add(bytes.size());
+        const std::span<uint8_t> room = region_->part(part_);
+        if (bytes.size() > room.size() || at > room.size() - bytes.size()) {
+            bytes_ -= bytes.size();
+            return fail(ErrorKind::input, "the input changed while it was read: it holds more than before", path_,
+                        "build again when it is complete");
+        }
+        std::memcpy(room.data() + at, bytes.data(), bytes.size());
+        return {};
+    }
     const std::lock_guard lock(mutex_);
     if (path_.empty()) {
         memory_.insert(memory_.end(), bytes.begin(), bytes.end());
@@ -21,9 +33,12 @@ Result<void> Spill::append(std::span<const uint8_t> bytes) {
 }
 
 Result<std::vector<uint8_t>> Spill::part(uint64_t offset, uint64_t count) const {
-    if (path_.empty())
-        return std::vector<uint8_t>(memory_.begin() + static_cast<ptrdiff_t>(offset),
-                                    memory_.begin() + static_cast<ptrdiff_t>(offset + count));
+    if (path_.empty()) {
+        const std::span<const uint8_t> all =
+            region_ != nullptr ? std::span<const uint8_t>(region_->part(part_)) : memory_;
+        const std::span<const uint8_t> wanted = all.subspan(offset, count);
+        return std::vector<uint8_t>(wanted.begin(), wanted.end());
+    }
     std::vector<uint8_t> bytes(count);
     if (count == 0) return bytes;
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path_));
@@ -32,6 +47,11 @@ Result<std::vector<uint8_t>> Spill::part(uint64_t offset, uint64_t count) const 
 }
 
 Result<std::vector<uint8_t>> Spill::take() {
+    if (region_ != nullptr) {
+        Result<std::vector<uint8_t>> bytes = part(0, bytes_);
+        release();
+        return bytes;
+    }
     if (path_.empty()) return std::exchange(memory_, {});
     STIPPLE_ASSIGN(std::vector<uint8_t> bytes, part(0, bytes_));
     uint64_t at = 0;
@@ -41,6 +61,16 @@ Result<std::vector<uint8_t>> Spill::take() {
         at += s.bytes;
     }
     return bytes;
+}
+
+Result<std::span<const uint8_t>> Spill::look(std::vector<uint8_t>& held) {
+    if (region_ != nullptr) return std::span<const uint8_t>(region_->part(part_)).first(bytes_);
+    STIPPLE_ASSIGN(held, take());
+    return std::span<const uint8_t>(held);
+}
+
+void Spill::release() {
+    if (region_ != nullptr) std::exchange(region_, nullptr)->release(part_);
 }
 
 Result<void> Spill::seal() {

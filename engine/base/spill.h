@@ -1,4 +1,4 @@
-// Bytes that several threads append to, in memory or in a file.
+// Bytes that several threads append to: in memory, in a place in memory that is large enough, or in a file.
 #pragma once
 
 #include <atomic>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/base/huge_buffer.h"
+#include "engine/base/huge_region.h"
 #include "engine/base/result.h"
 
 namespace stipple {
@@ -17,9 +17,11 @@ class Spill {
   public:
     /// `path` empty: in memory. A file that is there already stays what it is (see restore).
     explicit Spill(std::string path) : path_(std::move(path)) {}
-    /// In memory: room for that many bytes. Before anything is appended.
-    void reserve(uint64_t bytes) {
-        if (path_.empty() && memory_.empty()) reserveHuge(memory_, bytes);
+    /// In memory: in that part of a region, which outlives this and is large enough for all. Before anything is
+    /// appended.
+    void placeIn(HugeRegion& region, size_t part) {
+        region_ = &region;
+        part_ = part;
     }
     /// From several threads; what one call brings stays together.
     Result<void> append(std::span<const uint8_t> bytes);
@@ -31,6 +33,10 @@ class Spill {
     // When no thread appends any more:
     /// Everything. In memory it is gone afterwards.
     Result<std::vector<uint8_t>> take();
+    /// Everything, where it lies; what is in a file or a vector moves to `held`.
+    Result<std::span<const uint8_t>> look(std::vector<uint8_t>& held);
+    /// What lies in a region goes. (The rest went to whom it was handed.)
+    void release();
     /// A part of it; nothing goes.
     Result<std::vector<uint8_t>> part(uint64_t offset, uint64_t count) const;
     /// Hashes what came since the last time, for take() to check, if it is a file. More may be appended.
@@ -48,6 +54,8 @@ class Spill {
     std::string path_;
     std::mutex mutex_;
     std::vector<uint8_t> memory_;
+    HugeRegion* region_ = nullptr;
+    size_t part_ = 0;
     std::atomic<uint64_t> bytes_{0};
     std::vector<Segment> segments_;
     uint64_t sealedBytes_ = 0;

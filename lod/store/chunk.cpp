@@ -7,9 +7,10 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <memory>
+#include <span>
 
 #include "lod/store/check.h"
+#include "lod/store/vertex_encoder.h"
 #include "lod/store/zstd_memory.h"
 
 namespace stipple::lod {
@@ -23,11 +24,20 @@ struct ChunkHead {
     uint32_t recordBytes, lowBitBytes;
 };
 
-std::vector<uint8_t> compress(const std::vector<uint8_t>& raw) {
-    std::vector<uint8_t> out(ZSTD_compressBound(raw.size()));
+std::vector<uint8_t> compress(std::span<const uint8_t> raw) {
+    thread_local std::vector<uint8_t> room;
+    if (room.size() < ZSTD_compressBound(raw.size())) room.resize(ZSTD_compressBound(raw.size()));
     ZSTD_CCtx& context = zstdContext(ZSTD_createCCtx, ZSTD_freeCCtx);
-    out.resize(written(ZSTD_compressCCtx(&context, out.data(), out.size(), raw.data(), raw.size(), kZstdLevel)));
-    return out;
+    const size_t bytes =
+        written(ZSTD_compressCCtx(&context, room.data(), room.size(), raw.data(), raw.size(), kZstdLevel));
+    return {room.begin(), room.begin() + static_cast<ptrdiff_t>(bytes)};
+}
+
+/// meshoptimizer's codec under zstd.
+template <typename T>
+std::vector<uint8_t> encodeRecords(const std::vector<T>& records) {
+    thread_local std::vector<uint8_t> scratch;
+    return compress(encodeVertices(records.data(), records.size(), sizeof(T), scratch));
 }
 
 Result<std::vector<uint8_t>> decompress(const uint8_t* bytes, size_t count, size_t limit, const std::string& where) {
@@ -61,11 +71,7 @@ Result<std::vector<T>> decodeRecords(const uint8_t* bytes, size_t size, size_t c
 }  // namespace
 
 std::vector<uint8_t> encodeChunk(const Chunk& chunk) {
-    constexpr size_t stride = sizeof(shared::PointRecord);
-    std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.records.size(), stride));
-    vertex.resize(
-        meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.records.data(), chunk.records.size(), stride));
-    const std::vector<uint8_t> records = compress(vertex);
+    const std::vector<uint8_t> records = encodeRecords(chunk.records);
     std::vector<uint8_t> low;
     if (!chunk.lowBits.empty()) {
         std::vector<uint8_t> raw(chunk.lowBits.size() * 4);
@@ -101,13 +107,7 @@ Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, 
     return chunk;
 }
 
-std::vector<uint8_t> encodeCurveChunk(const Chunk& chunk) {
-    constexpr size_t stride = sizeof(shared::CurveSegment);
-    std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.segments.size(), stride));
-    vertex.resize(
-        meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.segments.data(), chunk.segments.size(), stride));
-    return compress(vertex);
-}
+std::vector<uint8_t> encodeCurveChunk(const Chunk& chunk) { return encodeRecords(chunk.segments); }
 
 Result<Chunk> decodeCurveChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where) {
     Chunk chunk;
@@ -155,11 +155,7 @@ Result<std::vector<T>> decompressArray(const uint8_t* bytes, size_t count, size_
 
 }  // namespace
 
-std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels) {
-    std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(texels.size(), 4));
-    vertex.resize(meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), texels.data(), texels.size(), 4));
-    return compress(vertex);
-}
+std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels) { return encodeRecords(texels); }
 
 Result<Chunk> decodeTile(const uint8_t* bytes, size_t count, const std::string& where) {
     constexpr size_t kTexels = size_t{shared::kTileEdge} * shared::kTileEdge;
@@ -169,10 +165,6 @@ Result<Chunk> decodeTile(const uint8_t* bytes, size_t count, const std::string& 
 }
 
 std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk) {
-    constexpr size_t stride = sizeof(shared::MeshVertex);
-    std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.vertices.size(), stride));
-    vertex.resize(
-        meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.vertices.data(), chunk.vertices.size(), stride));
     // Planes of bytes compress better than words: each corner's index follows that of the triangle before.
     std::vector<uint8_t> corners(chunk.triangles.size() * 4);
     for (size_t i = 0; i < chunk.triangles.size(); ++i)
@@ -180,7 +172,7 @@ std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk) {
             corners[k * chunk.triangles.size() + i] = static_cast<uint8_t>(chunk.triangles[i] >> (8 * k));
     std::vector<uint8_t> clusters(chunk.clusters.size() * sizeof(shared::MeshCluster));
     if (!clusters.empty()) std::memcpy(clusters.data(), chunk.clusters.data(), clusters.size());
-    const std::vector<uint8_t> a = compress(vertex), b = compress(corners), c = compress(clusters);
+    const std::vector<uint8_t> a = encodeRecords(chunk.vertices), b = compress(corners), c = compress(clusters);
     const MeshChunkHead head{static_cast<uint32_t>(a.size()), static_cast<uint32_t>(b.size()),
                              static_cast<uint32_t>(c.size())};
     std::vector<uint8_t> out(sizeof(head));

@@ -117,10 +117,14 @@ void Distribution::makeBuckets() {
     const int rank = ranks == nullptr ? 0 : ranks->rank();
     std::error_code error;
     if (ranks != nullptr) fs::create_directory(fmt::format("{}/rank-{}", workspace_.folder(), rank), error);
+    std::vector<uint64_t> sizes;
     for (size_t b = 0; b < plan_.buckets.size(); ++b) {
         buckets_.push_back(std::make_unique<BucketBytes>(folderOf(rank, b), b));
-        buckets_[b]->points.reserve(plan_.buckets[b].points * layout_.bytes());
+        sizes.push_back(plan_.buckets[b].points * layout_.bytes());
     }
+    if (workspace_.isOnDisk()) return;
+    region_.emplace(sizes);
+    for (size_t b = 0; b < buckets_.size(); ++b) buckets_[b]->points.placeIn(*region_, b);
 }
 
 uint64_t Distribution::temporaryBytes() const {

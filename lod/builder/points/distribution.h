@@ -65,6 +65,7 @@ class Distribution {
     double rounding_ = 0;
     std::optional<CellTree> tree_;
     BucketPlan plan_;
+    std::optional<HugeRegion> region_;  ///< where the buckets' points lie, in memory
     Buckets buckets_;
     size_t nextPart_ = 0;  ///< of the input: those before are sent
 };

@@ -82,7 +82,7 @@ void sortTies(std::vector<Keyed<K>>& order, const PlaceOf& placeOf, const IsLess
 namespace {
 
 template <typename K>
-SortResult sortBytesBy(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
+SortResult sortBytesBy(const Frame& frame, const RecordLayout& layout, std::span<const uint8_t> bytes,
                        bool mergeDuplicates) {
     SortResult result;
     const size_t stride = layout.bytes(), count = bytes.size() / stride;
@@ -110,7 +110,7 @@ SortResult sortBytesBy(const Frame& frame, const RecordLayout& layout, const std
 }
 
 /// Keys of 64 bits do for all but the widest scenes, and move half the bytes.
-SortResult sortBytes(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
+SortResult sortBytes(const Frame& frame, const RecordLayout& layout, std::span<const uint8_t> bytes,
                      bool mergeDuplicates) {
     return frame.keyLevels > kShortBits ? sortBytesBy<Key>(frame, layout, bytes, mergeDuplicates)
                                         : sortBytesBy<uint64_t>(frame, layout, bytes, mergeDuplicates);
@@ -122,8 +122,11 @@ Result<SortResult> sortBucket(const Frame& frame, const RecordLayout& layout, Sp
                               uint64_t most) {
     const size_t stride = layout.bytes();
     if (bucket.bytes() <= most * stride) {
-        STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, bucket.take());
-        return sortBytes(frame, layout, bytes, mergeDuplicates);
+        std::vector<uint8_t> held;
+        STIPPLE_ASSIGN(const std::span<const uint8_t> bytes, bucket.look(held));
+        SortResult result = sortBytes(frame, layout, bytes, mergeDuplicates);
+        bucket.release();
+        return result;
     }
     // What is left out of the pieces would be left out of the whole: the first of the order stay.
     SortResult result;
@@ -142,6 +145,7 @@ Result<SortResult> sortBucket(const Frame& frame, const RecordLayout& layout, Sp
         for (size_t i = 0; i < result.sorted.points.size(); ++i)
             layout.write(result.sorted.points, i, kept.data() + i * stride);
     }
+    bucket.release();
     result.tooMany = tooMany;
     result.merged = merged;
     return result;
