@@ -11,7 +11,7 @@
 #include <cstring>
 
 #include "lod/builder/mesh/mesh_work.h"
-#include "lod/primitives/triangle.h"
+#include "lod/builder/mesh/triangle_grid.h"
 
 namespace stipple::lod {
 namespace {
@@ -20,121 +20,7 @@ constexpr int kColourStep = 48;  ///< sRGB steps from which colours count as dif
 
 struct Nearest {
     float distance = 3e38f;
-    uint32_t triangle = 0;
-};
-
-/// Triangles in the cells of an even grid, for nearest-triangle queries.
-class Target {
-  public:
-    Target(const std::vector<glm::vec3>& position, const std::vector<uint32_t>& indices)
-        : position_(position), indices_(indices) {
-        glm::vec3 lo(3e38f), hi(-3e38f);
-        double area = 0;
-        for (size_t i = 0; i < indices.size(); i += 3) {
-            for (size_t k = 0; k < 3; ++k) {
-                lo = glm::min(lo, position[indices[i + k]]);
-                hi = glm::max(hi, position[indices[i + k]]);
-            }
-            area += 0.5 * static_cast<double>(glm::length(glm::cross(position[indices[i + 1]] - position[indices[i]],
-                                                                     position[indices[i + 2]] - position[indices[i]])));
-        }
-        const double triangles = static_cast<double>(indices.size()) / 3;
-        lo_ = lo;
-        cell_ = std::max(static_cast<float>(std::sqrt(area / std::max(1.0, triangles)) * 2.0),
-                         std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) / 48);
-        cell_ = std::max(cell_, 1e-3f);
-        for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) / cell_);
-        start_.assign(static_cast<size_t>(size_.x) * static_cast<size_t>(size_.y) * static_cast<size_t>(size_.z) + 1,
-                      0);
-        spheres_.resize(indices.size() / 3);
-        for (uint32_t t = 0; t < spheres_.size(); ++t) {
-            const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
-            const glm::vec3 m = (a + b + c) * (1.0f / 3);
-            const float r = std::max({glm::length(a - m), glm::length(b - m), glm::length(c - m)});
-            spheres_[t] = glm::vec4(m, r * 1.00001f + 1e-6f);
-        }
-        for (const bool isCounting : {true, false}) {
-            for (uint32_t t = 0; t < indices.size() / 3; ++t) {
-                const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
-                const glm::ivec3 from = cellOf(glm::min(a, glm::min(b, c))), to = cellOf(glm::max(a, glm::max(b, c)));
-                for (int z = from.z; z <= to.z; ++z)
-                    for (int y = from.y; y <= to.y; ++y)
-                        for (int x = from.x; x <= to.x; ++x) {
-                            uint32_t& at = start_[number(x, y, z)];
-                            if (isCounting)
-                                ++at;
-                            else
-                                items_[--at] = t;
-                        }
-            }
-            if (!isCounting) break;
-            uint32_t sum = 0;
-            for (uint32_t& s : start_) s = sum += s;
-            items_.resize(sum);
-        }
-    }
-
-    const glm::vec3& corner(uint32_t t, size_t k) const { return position_[indices_[3 * size_t{t} + k]]; }
-    float distance(const glm::vec3& p, uint32_t t) const {
-        const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
-        const glm::vec2 w = closestWeights(p, a, b, c);
-        return glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
-    }
-
-    /// Calls visit(triangle) for all that may be nearer to p than `limit`, which visit lowers, until it says that it
-    /// has seen enough; some are visited twice.
-    template <typename Visit>
-    void inBall(const glm::vec3& p, const float& limit, const Visit& isEnough) const {
-        const auto row = [&](int x0, int x1, int y, int z) {
-            const uint32_t last = start_[number(x1, y, z) + 1];
-            for (uint32_t i = start_[number(x0, y, z)]; i < last; ++i)
-                if (isNear(p, items_[i], limit) && isEnough(items_[i])) return true;
-            return false;
-        };
-        // What lies in the same cell first: the ball is much smaller afterwards.
-        const glm::ivec3 own = cellOf(p);
-        if (row(own.x, own.x, own.y, own.z)) return;
-        const glm::ivec3 from = cellOf(p - limit), to = cellOf(p + limit);
-        if (from == to) return;
-        for (int z = from.z; z <= to.z; ++z)
-            for (int y = from.y; y <= to.y; ++y)
-                if (row(from.x, to.x, y, z)) return;
-    }
-
-    /// The nearest triangle, or one not farther than `enough`; `best`: one that is known to be near.
-    Nearest nearest(const glm::vec3& p, Nearest best, float enough) const {
-        inBall(p, best.distance, [&](uint32_t t) {
-            const float d = distance(p, t);
-            if (d < best.distance) best = {d, t};
-            return best.distance <= enough;
-        });
-        return best;
-    }
-
-  private:
-    /// Can any point of triangle t be nearer than `limit`?
-    bool isNear(const glm::vec3& p, uint32_t t, float limit) const {
-        const glm::vec4& s = spheres_[t];
-        const glm::vec3 d = p - glm::vec3(s);
-        const float reach = limit + s.w;
-        return glm::dot(d, d) < reach * reach;
-    }
-    glm::ivec3 cellOf(const glm::vec3& p) const {
-        // (Before it is whole: a ball may be larger than integers are, and then begins in the first cell.)
-        return glm::ivec3(glm::clamp((p - lo_) / cell_, glm::vec3(0), glm::vec3(size_ - 1)));
-    }
-    size_t number(int x, int y, int z) const {
-        return (static_cast<size_t>(z) * static_cast<size_t>(size_.y) + static_cast<size_t>(y)) *
-                   static_cast<size_t>(size_.x) +
-               static_cast<size_t>(x);
-    }
-    const std::vector<glm::vec3>& position_;
-    const std::vector<uint32_t>& indices_;
-    glm::vec3 lo_{0};
-    float cell_ = 1;
-    glm::ivec3 size_{1};
-    std::vector<uint32_t> start_, items_;
-    std::vector<glm::vec4> spheres_;  ///< of each triangle: centre, radius
+    uint32_t triangle = 0;  ///< or one near it
 };
 
 using Triple = std::array<uint32_t, 3>;
@@ -150,14 +36,6 @@ std::vector<Triple> sorted(const std::vector<uint32_t>& indices) {
     return out;
 }
 
-/// A place whose distance is wanted: `most` is what the result would be if the nearest triangle were no nearer than the
-/// hint.
-struct Probe {
-    glm::vec3 p;
-    uint32_t hint;
-    float above, corners, most;
-};
-
 /// Of the two triangles at an edge, which turn round it in opposite directions, one measures its middle. By position:
 /// at a seam they have vertices of their own. An edge with one triangle is a border, which simplification keeps.
 bool isMeasuredHere(const glm::vec3& a, const glm::vec3& b) {
@@ -166,53 +44,52 @@ bool isMeasuredHere(const glm::vec3& a, const glm::vec3& b) {
 
 /// Largest distance of `triangles` from the target, whose own are `others`; what stands in both needs no look.
 /// `nearest`: of the vertices. Not below `worst`.
-float measureSurface(const Target& target, const std::vector<glm::vec3>& position, const std::vector<Triple>& triangles,
-                     const std::vector<Triple>& others, const std::vector<Nearest>& nearest, bool isBorderKept,
-                     float worst) {
-    // First only what the corners' nearest triangles say; then the worst are looked at closely, and what cannot exceed
-    // them needs no search.
-    std::vector<Probe> probes;
-    const auto resultOf = [](float corners, float distance) {
-        return corners + 2 * std::max(0.0f, distance - corners);
-    };
+float measureSurface(const TriangleGrid& target, const std::vector<glm::vec3>& position,
+                     const std::vector<Triple>& triangles, const std::vector<Triple>& others,
+                     const std::vector<Nearest>& nearest, bool isBorderKept, float worst) {
     auto other = others.begin();
     for (const Triple& t : triangles) {
         while (other != others.end() && *other < t) ++other;
         if (other != others.end() && *other == t) continue;
-        const auto take = [&](const glm::vec3& p, float corners) {
-            Probe probe{p, 0, 3e38f, corners, 0};
-            for (const uint32_t v : t) {
-                const float d = target.distance(p, nearest[v].triangle);
-                if (d < probe.above) probe = {p, nearest[v].triangle, d, corners, 0};
-                probe.most = resultOf(corners, probe.above);
-                if (probe.most <= worst) return;
-            }
-            probes.push_back(probe);
+        const auto take = [&](const glm::vec3& p, float corners, uint32_t hint) {
+            const float harmless = 0.5f * (worst + corners);
+            const float distance = target.leastDistance(p, hint, harmless);
+            if (distance > harmless) worst = std::max(worst, corners + 2 * std::max(0.0f, distance - corners));
         };
         float all = 0;
         for (size_t k = 0; k < 3; ++k) {
             const uint32_t v = t.at(k), w = t.at((k + 1) % 3);
             all = std::max(all, nearest[v].distance);
             if (!isBorderKept || isMeasuredHere(position[v], position[w]))
-                take(0.5f * (position[v] + position[w]), std::max(nearest[v].distance, nearest[w].distance));
+                take(0.5f * (position[v] + position[w]), std::max(nearest[v].distance, nearest[w].distance),
+                     nearest[v].triangle);
         }
-        take((position[t[0]] + position[t[1]] + position[t[2]]) * (1.0f / 3), all);
-    }
-    const auto byMost = [](const Probe& a, const Probe& b) { return a.most > b.most; };
-    const size_t first = std::min<size_t>(probes.size(), 64);
-    std::partial_sort(probes.begin(), probes.begin() + static_cast<ptrdiff_t>(first), probes.end(), byMost);
-    for (const Probe& probe : probes) {
-        if (probe.most <= worst) continue;
-        const float harmless = 0.5f * (worst + probe.corners);
-        worst = std::max(
-            worst, resultOf(probe.corners, target.nearest(probe.p, {probe.above, probe.hint}, harmless).distance));
+        take((position[t[0]] + position[t[1]] + position[t[2]]) * (1.0f / 3), all, nearest[t[0]].triangle);
     }
     return worst;
 }
 
+/// Do no two vertices look so different that shiftOf() is more than nothing?
+bool areAlike(const WeldedMesh& mesh, const LocalMesh& local) {
+    const shared::MeshVertex& first = mesh.vertex(local.global[0]);
+    std::array<uint32_t, 3> least{255, 255, 255}, greatest{};
+    for (const uint32_t v : local.global) {
+        const shared::MeshVertex& vertex = mesh.vertex(v);
+        if ((vertex.surface & shared::kSurfaceTextured) != 0) return false;
+        if (((vertex.surface ^ first.surface) & shared::kSurfaceMaterialMask) != 0) return false;
+        for (size_t k = 0; k < 3; ++k) {
+            least.at(k) = std::min(least.at(k), vertex.colour >> 8 * k & 255u);
+            greatest.at(k) = std::max(greatest.at(k), vertex.colour >> 8 * k & 255u);
+        }
+    }
+    for (size_t k = 0; k < 3; ++k)
+        if (greatest.at(k) - least.at(k) >= uint32_t{kColourStep}) return false;
+    return true;
+}
+
 /// How far the look of vertex `v` moves along the surface if triangle `t` of the target stands in its place.
 float shiftOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse, uint32_t v,
-              const Target& target, uint32_t t, float& distance) {
+              const TriangleGrid& target, uint32_t t, float& distance) {
     const glm::vec3 &p = local.position[v], &a = target.corner(t, 0), &b = target.corner(t, 1),
                     &c = target.corner(t, 2);
     const glm::vec2 w = closestWeights(p, a, b, c);
@@ -261,7 +138,8 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
     }
     LocalMesh near = local;
     near.position = position;
-    const Target toCoarse(position, coarse);
+    const bool isAlike = areAlike(mesh, local);
+    const TriangleGrid toCoarse(position, coarse, !isAlike);
     std::vector<Nearest> nearest(position.size());
     std::vector<uint8_t> isKept(position.size());
     for (uint32_t i = 0; i < coarse.size(); ++i) {
@@ -278,6 +156,12 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
     // the least of distance and shift: beside a seam the nearest triangle may be the wrong one.
     std::vector<uint8_t>& isKnown = isKept;
     const auto find = [&](uint32_t v, uint32_t hint) {
+        isKnown[v] = 1;
+        if (isAlike) {
+            nearest[v] = {toCoarse.leastDistance(position[v], hint), hint};
+            worst = std::max(worst, nearest[v].distance);
+            return;
+        }
         Nearest best{3e38f, hint};
         float look = 3e38f;
         const auto visit = [&](uint32_t t) {
@@ -290,7 +174,6 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
         visit(hint);
         toCoarse.inBall(position[v], look, visit);
         nearest[v] = best;
-        isKnown[v] = 1;
         worst = std::max(worst, look);
     };
     for (uint32_t v = 0; v < local.firstMoved(); ++v)
@@ -308,11 +191,11 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
         if (!isKnown[v]) find(v, 0);  // a part of its own that is gone altogether
     const std::vector<Triple> fine = sorted(near.indices), left = sorted(coarse);
     worst = measureSurface(toCoarse, position, fine, left, nearest, isBorderKept, worst);
-    const Target toFine(position, near.indices);
+    const TriangleGrid toFine(position, near.indices, false);
     for (uint32_t i = 0; i < near.indices.size(); ++i) nearest[near.indices[i]] = {0, i / 3};
     for (uint32_t v = local.firstMoved(); v < position.size(); ++v) {
         const uint32_t hint = nearest[local.beforeMove(v)].triangle;
-        nearest[v] = toFine.nearest(position[v], {toFine.distance(position[v], hint), hint}, 0);
+        nearest[v] = {toFine.leastDistance(position[v], hint), hint};
         worst = std::max(worst, nearest[v].distance);
     }
     worst = measureSurface(toFine, position, left, fine, nearest, isBorderKept, worst);

@@ -1,0 +1,150 @@
+#include "lod/builder/mesh/triangle_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/wide.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr size_t kAtOnce = 8;
+constexpr float kMostCells = 48;  ///< along an axis
+constexpr float kFar = 1e38f;     ///< more than any square of a distance
+
+using Eight [[gnu::vector_size(4 * kAtOnce)]] = float;
+using EightAnywhere [[gnu::vector_size(4 * kAtOnce), gnu::may_alias, gnu::aligned(4)]] = float;
+
+}  // namespace
+
+/// Least square of a distance from items [first, last) and, as eight are looked at at once, some behind them. The
+/// numbers are those of closestWeights(), of whose cases the first that holds counts: here they stand the other way
+/// round, and each takes the place of those before it.
+STIPPLE_WIDE static float leastSquare(const TriangleGrid::Columns& columns, size_t first, size_t last,
+                                      const float (&p)[3]) {
+    const float px = p[0], py = p[1], pz = p[2];
+    Eight least = Eight{} + kFar;
+    for (; first < last; first += kAtOnce) {
+        const auto* const at = columns.data();
+        const Eight ax = *reinterpret_cast<const EightAnywhere*>(at[0].data() + first),
+                    ay = *reinterpret_cast<const EightAnywhere*>(at[1].data() + first),
+                    az = *reinterpret_cast<const EightAnywhere*>(at[2].data() + first),
+                    bx = *reinterpret_cast<const EightAnywhere*>(at[3].data() + first),
+                    by = *reinterpret_cast<const EightAnywhere*>(at[4].data() + first),
+                    bz = *reinterpret_cast<const EightAnywhere*>(at[5].data() + first),
+                    cx = *reinterpret_cast<const EightAnywhere*>(at[6].data() + first),
+                    cy = *reinterpret_cast<const EightAnywhere*>(at[7].data() + first),
+                    cz = *reinterpret_cast<const EightAnywhere*>(at[8].data() + first);
+        const Eight abx = bx - ax, aby = by - ay, abz = bz - az, acx = cx - ax, acy = cy - ay, acz = cz - az;
+        const Eight apx = px - ax, apy = py - ay, apz = pz - az, bpx = px - bx, bpy = py - by, bpz = pz - bz,
+                    cpx = px - cx, cpy = py - cy, cpz = pz - cz;
+        const Eight d1 = abx * apx + aby * apy + abz * apz, d2 = acx * apx + acy * apy + acz * apz,
+                    d3 = abx * bpx + aby * bpy + abz * bpz, d4 = acx * bpx + acy * bpy + acz * bpz,
+                    d5 = abx * cpx + aby * cpy + abz * cpz, d6 = acx * cpx + acy * cpy + acz * cpz;
+        const Eight va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2, all = va + vb + vc;
+        const Eight alongB = d4 - d3, alongC = d5 - d6;
+        const auto isBC = (va <= 0) & (alongB >= 0) & (alongC >= 0), isAC = (vb <= 0) & (d2 >= 0) & (d6 <= 0),
+                   isAB = (vc <= 0) & (d1 >= 0) & (d3 <= 0);
+        const auto isA = (d1 <= 0) & (d2 <= 0), isB = (d3 >= 0) & (d4 <= d3), isC = (d6 >= 0) & (d5 <= d6);
+        const Eight partB = isAB ? d1 : vb, wholeB = isAB ? d1 - d3 : all;
+        const Eight partC = isAC ? d2 : isBC ? alongB : vc, wholeC = isAC ? d2 - d6 : isBC ? alongB + alongC : all;
+        const Eight none = Eight{}, one = none + 1.0f;
+        const Eight shareB = wholeB > 0 ? partB / wholeB : none, shareC = wholeC > 0 ? partC / wholeC : none;
+        Eight b = isAC ? none : isBC ? one - shareC : shareB, c = shareC;
+        b = isC ? none : b;
+        c = isC ? one : c;
+        b = isAB ? shareB : b;
+        c = isAB ? none : c;
+        b = isB ? one : b;
+        c = isB ? none : c;
+        b = isA ? none : b;
+        c = isA ? none : c;
+        const Eight dx = px - (ax + b * abx + c * acx), dy = py - (ay + b * aby + c * acy),
+                    dz = pz - (az + b * abz + c * acz);
+        const Eight square = dx * dx + dy * dy + dz * dz;
+        least = square < least ? square : least;
+    }
+    float all = least[0];
+    for (size_t lane = 1; lane < kAtOnce; ++lane) all = std::min(all, least[lane]);
+    return all;
+}
+
+TriangleGrid::TriangleGrid(const std::vector<glm::vec3>& position, const std::vector<uint32_t>& indices, bool wantsEach)
+    : position_(position), indices_(indices) {
+    glm::vec3 lo(3e38f), hi(-3e38f);
+    double area = 0;
+    const auto triangles = static_cast<uint32_t>(indices.size() / 3);
+    for (uint32_t t = 0; t < triangles; ++t) {
+        for (size_t k = 0; k < 3; ++k) {
+            lo = glm::min(lo, corner(t, k));
+            hi = glm::max(hi, corner(t, k));
+        }
+        area += 0.5 *
+                static_cast<double>(glm::length(glm::cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0))));
+    }
+    const float cell = std::max({static_cast<float>(std::sqrt(area / std::max(1.0, static_cast<double>(triangles))) * 2.0),
+                                 std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) / kMostCells, 1e-3f});
+    lo_ = lo;
+    perCell_ = 1 / cell;
+    for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) * perCell_);
+    placeItems();
+    if (wantsEach) makeSpheres();
+}
+
+void TriangleGrid::placeItems() {
+    start_.assign(static_cast<size_t>(size_.x) * static_cast<size_t>(size_.y) * static_cast<size_t>(size_.z) + 1, 0);
+    const auto forCells = [&](const auto& use) {
+        for (uint32_t t = 0; t < indices_.size() / 3; ++t) {
+            const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+            const glm::ivec3 from = cellOf(glm::min(a, glm::min(b, c))), to = cellOf(glm::max(a, glm::max(b, c)));
+            for (int z = from.z; z <= to.z; ++z)
+                for (int y = from.y; y <= to.y; ++y)
+                    for (int x = from.x; x <= to.x; ++x) use(t, start_[number(x, y, z)]);
+        }
+    };
+    forCells([](uint32_t, uint32_t& count) { ++count; });
+    uint32_t sum = 0;
+    for (uint32_t& s : start_) s = sum += s;
+    items_.resize(sum);
+    forCells([&](uint32_t t, uint32_t& at) { items_[--at] = t; });
+    // (What stands behind the last is looked at with it.)
+    for (size_t k = 0; k < columns_.size(); ++k) {
+        std::vector<float>& column = columns_.at(k);
+        column.resize(items_.size() + kAtOnce - 1);
+        const auto axis = static_cast<int>(k % 3);
+        for (size_t i = 0; i < items_.size(); ++i) column[i] = corner(items_[i], k / 3)[axis];
+        for (size_t i = items_.size(); i < column.size() && i > 0; ++i) column[i] = column[i - 1];
+    }
+}
+
+void TriangleGrid::makeSpheres() {
+    spheres_.resize(indices_.size() / 3);
+    for (uint32_t t = 0; t < spheres_.size(); ++t) {
+        const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+        const glm::vec3 m = (a + b + c) * (1.0f / 3);
+        const float r = std::max({glm::length(a - m), glm::length(b - m), glm::length(c - m)});
+        spheres_[t] = glm::vec4(m, r * 1.00001f + 1e-6f);
+    }
+}
+
+float TriangleGrid::leastInRow(const glm::vec3& p, int x0, int x1, int y, int z) const {
+    return std::sqrt(leastSquare(columns_, start_[number(x0, y, z)], start_[number(x1, y, z) + 1], {p.x, p.y, p.z}));
+}
+
+float TriangleGrid::leastDistance(const glm::vec3& p, uint32_t hint, float enough) const {
+    // What lies in the same cell first: the ball is much smaller afterwards.
+    const glm::ivec3 own = cellOf(p);
+    const size_t cell = number(own.x, own.y, own.z);
+    float least = start_[cell] == start_[cell + 1] ? distance(p, hint) : leastInRow(p, own.x, own.x, own.y, own.z);
+    if (least <= enough) return least;
+    const glm::ivec3 from = cellOf(p - least), to = cellOf(p + least);
+    if (from == to) return least;
+    for (int z = from.z; z <= to.z; ++z)
+        for (int y = from.y; y <= to.y; ++y) {
+            least = std::min(least, leastInRow(p, from.x, to.x, y, z));
+            if (least <= enough) return least;
+        }
+    return least;
+}
+
+}  // namespace stipple::lod
