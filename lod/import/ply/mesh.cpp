@@ -1,5 +1,6 @@
 #include "lod/import/ply/mesh.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -21,6 +22,11 @@ class FaceTaker {
   public:
     explicit FaceTaker(const Triangle& triangle) : triangle_(triangle) {}
     Result<void> take(const PlyReader::Corners& corners) {
+        if (corners.areTriangles) {
+            for (size_t i = 0; i < corners.list.size(); i += 3)
+                STIPPLE_TRY(triangle_(corners.list[i], corners.list[i + 1], corners.list[i + 2]));
+            return {};
+        }
         if (corners.isFirst) count_ = 0;
         for (const double v : corners.list) {
             if (corners.isStrip && v < 0) {  // -1 starts a new one
@@ -217,10 +223,8 @@ class PlyMesh {
         const glm::dvec3 size = 0.5 * bounds.hi - 0.5 * bounds.lo;
         int exponent = 0;
         (void)std::frexp(std::max({size.x, size.y, size.z}), &exponent);
-        const auto edge = [&](const Vertex& from, const Vertex& to) {
-            const glm::dvec3 d = to.position - from.position;
-            return glm::dvec3(std::ldexp(d.x, -exponent), std::ldexp(d.y, -exponent), std::ldexp(d.z, -exponent));
-        };
+        const double scale = std::ldexp(1.0, -std::clamp(exponent, -1000, 1000));
+        const auto edge = [&](const Vertex& from, const Vertex& to) { return scale * (to.position - from.position); };
         return forTriangles([&](double a, double b, double c) -> Result<void> {
             if (++done % kOften == 0) STIPPLE_TRY(tell(done));
             const auto n = static_cast<double>(count_);
@@ -230,8 +234,9 @@ class PlyMesh {
             std::array<Vertex, 3> v{vertices_.get(corner[0]), vertices_.get(corner[1]), vertices_.get(corner[2])};
             const glm::vec3 sum(glm::cross(edge(v[0], v[1]), edge(v[0], v[2])));
             if (!isFinite(sum)) return {};
+            const bool isOneTwice = corner[0] == corner[1] || corner[1] == corner[2] || corner[2] == corner[0];
             for (size_t k = 0; k < 3; ++k) {
-                v.at(k) = vertices_.get(corner.at(k));  // (one vertex may be two corners)
+                if (isOneTwice) v.at(k) = vertices_.get(corner.at(k));
                 v.at(k).normal += sum;
                 vertices_.set(corner.at(k), v.at(k));
             }

@@ -179,11 +179,36 @@ Result<size_t> PlyReader::read(PointBlock& block, size_t limit) {
     return count;
 }
 
-Result<void> PlyReader::flushCorners() {
-    STIPPLE_TRY((*take_)({isStrip_, isFirst_, list_}));
+Result<void> PlyReader::flushCorners(bool areTriangles) {
+    STIPPLE_TRY((*take_)({isStrip_, isFirst_, areTriangles, list_}));
     isFirst_ = false;
     list_.clear();
     return {};
+}
+
+/// Rows of three corners, as most files hold them and nothing else: as many as stand here one after the other and fit
+/// in a block. Of all others, and at the end of a file that is too short: none.
+Result<uint64_t> PlyReader::readTriangles(const PlyElement& element, uint64_t most) {
+    constexpr uint64_t kRowBytes = 1 + 3 * 4, kRows = 4096;
+    const bool isPlain = header_.encoding == PlyEncoding::little && cornerList_ != nullptr && !isStrip_ &&
+                         element.properties.size() == 1 && cornerList_->countType <= PlyType::u8 &&
+                         (cornerList_->type == PlyType::i32 || cornerList_->type == PlyType::u32);
+    if (!isPlain) return 0;
+    size_t available = 0;
+    STIPPLE_ASSIGN(const uint8_t* const bytes, cursor_.peek(std::min(most, kRows) * kRowBytes, available));
+    const uint64_t rows = std::min({most, kRows, available / kRowBytes});
+    const bool isSigned = cornerList_->type == PlyType::i32;
+    uint64_t row = 0;
+    list_.resize(3 * rows);
+    for (; row < rows && bytes[row * kRowBytes] == 3; ++row)
+        for (uint64_t k = 0; k < 3; ++k) {
+            uint32_t corner = 0;
+            std::memcpy(&corner, bytes + row * kRowBytes + 1 + 4 * k, 4);
+            list_[3 * row + k] = isSigned ? static_cast<double>(static_cast<int32_t>(corner)) : corner;
+        }
+    list_.resize(3 * row);
+    cursor_.skip(row * kRowBytes);
+    return row;
 }
 
 Result<void> PlyReader::readCorners(uint64_t offset, const std::function<Result<void>(const Corners&)>& take) {
@@ -199,6 +224,12 @@ Result<void> PlyReader::readCorners(uint64_t offset, const std::function<Result<
         for (uint64_t r = 0; r < element->count; ++r) {
             list_.clear();
             isFirst_ = true;
+            STIPPLE_ASSIGN(const uint64_t triangles, readTriangles(*element, element->count - r));
+            if (triangles > 0) {
+                STIPPLE_TRY(flushCorners(true));
+                r += triangles - 1;
+                continue;
+            }
             STIPPLE_TRY(readRow(*element, nullptr));
             if (cornerList_) STIPPLE_TRY(flushCorners());
         }

@@ -32,9 +32,10 @@ class PlyReader {
     /// After the last vertex: where the elements behind it begin.
     uint64_t offset() const { return cursor_.offset(); }
 
-    /// Corners of one row of an element behind the vertices, or a part of them, the first part of a row first.
+    /// Corners of one row of an element behind the vertices, or a part of them, the first part of a row first; or of
+    /// several rows of three corners each.
     struct Corners {
-        bool isStrip = false, isFirst = false;
+        bool isStrip = false, isFirst = false, areTriangles = false;
         const std::vector<double>& list;
     };
     /// Rows of the elements behind the vertices that have corners; `offset`: where they begin.
@@ -46,7 +47,8 @@ class PlyReader {
     Result<void> readRow(const PlyElement& element, double* values);
     Result<void> readAsciiRow(const PlyElement& element, double* values);
     tl::unexpected<Error> badNumber(const PlyElement& element) const;
-    Result<void> flushCorners();
+    Result<void> flushCorners(bool areTriangles = false);
+    Result<uint64_t> readTriangles(const PlyElement& element, uint64_t most);
 
     std::shared_ptr<const ByteSource> file_;
     PlyHeader header_;
