@@ -82,8 +82,9 @@ TriangleGrid::TriangleGrid(const std::vector<glm::vec3>& position, const std::ve
         area += 0.5 *
                 static_cast<double>(glm::length(glm::cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0))));
     }
-    const float cell = std::max({static_cast<float>(std::sqrt(area / std::max(1.0, static_cast<double>(triangles))) * 2.0),
-                                 std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) / kMostCells, 1e-3f});
+    const float cell =
+        std::max({static_cast<float>(std::sqrt(area / std::max(1.0, static_cast<double>(triangles))) * 2.0),
+                  std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) / kMostCells, 1e-3f});
     lo_ = lo;
     perCell_ = 1 / cell;
     for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) * perCell_);
@@ -106,15 +107,23 @@ void TriangleGrid::placeItems() {
     uint32_t sum = 0;
     for (uint32_t& s : start_) s = sum += s;
     items_.resize(sum);
-    forCells([&](uint32_t t, uint32_t& at) { items_[--at] = t; });
     // (What stands behind the last is looked at with it.)
+    std::array<float*, 9> to{};
     for (size_t k = 0; k < columns_.size(); ++k) {
-        std::vector<float>& column = columns_.at(k);
-        column.resize(items_.size() + kAtOnce - 1);
-        const auto axis = static_cast<int>(k % 3);
-        for (size_t i = 0; i < items_.size(); ++i) column[i] = corner(items_[i], k / 3)[axis];
-        for (size_t i = items_.size(); i < column.size() && i > 0; ++i) column[i] = column[i - 1];
+        columns_.at(k).resize(items_.size() + kAtOnce - 1);
+        to.at(k) = columns_.at(k).data();
     }
+    forCells([&](uint32_t t, uint32_t& at) {
+        items_[--at] = t;
+        for (size_t k = 0; k < 3; ++k) {
+            const glm::vec3& from = corner(t, k);
+            to[3 * k][at] = from.x;
+            to[3 * k + 1][at] = from.y;
+            to[3 * k + 2][at] = from.z;
+        }
+    });
+    for (std::vector<float>& column : columns_)
+        for (size_t i = items_.size(); i < column.size() && i > 0; ++i) column[i] = column[i - 1];
 }
 
 void TriangleGrid::makeSpheres() {
