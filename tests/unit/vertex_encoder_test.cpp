@@ -17,7 +17,7 @@ std::vector<uint8_t> bytesOfKind(int kind, size_t count, size_t stride, Rng& rng
     std::vector<uint8_t> bytes(count * stride);
     for (size_t i = 0; i < bytes.size(); ++i) {
         const int before = i >= stride ? bytes[i - stride] : 0;
-        const auto small = [&](uint32_t width) {
+        const auto small = [&](size_t width) {
             return static_cast<int>(rng.below(width)) - static_cast<int>(width / 2);
         };
         const int any = static_cast<int>(rng.below(256));

@@ -64,8 +64,15 @@ LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& c
     return out;
 }
 
-void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, uint32_t producer, bool isAlongCurve,
+void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& given, Triangles triangles,
                     std::vector<Cluster>& out) {
+    std::vector<uint32_t> alongCurve;
+    if (triangles == Triangles::small) {
+        alongCurve.resize(given.size());
+        meshopt_spatialSortTriangles(alongCurve.data(), given.data(), given.size(), &local.position[0].x,
+                                     local.position.size(), sizeof(glm::vec3));
+    }
+    const std::vector<uint32_t>& indices = triangles == Triangles::small ? alongCurve : given;
     // (Coordinates of 64 bits take two places.)
     const size_t mostVertices = local.isWide ? shared::kClusterVertices / 2 : shared::kClusterVertices;
     constexpr size_t kTriangles = shared::kClusterTriangles;
@@ -74,15 +81,15 @@ void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices
     std::vector<uint32_t> vertices(bound * mostVertices);
     std::vector<uint8_t> corners(bound * kTriangles * 3);
     const size_t count =
-        isAlongCurve ? meshopt_buildMeshletsScan(meshlets.data(), vertices.data(), corners.data(), indices.data(),
-                                                 indices.size(), local.position.size(), mostVertices, kTriangles)
-                     : meshopt_buildMeshlets(meshlets.data(), vertices.data(), corners.data(), indices.data(),
-                                             indices.size(), &local.position[0].x, local.position.size(),
-                                             sizeof(glm::vec3), mostVertices, kTriangles, 0.0f);
+        triangles != Triangles::any
+            ? meshopt_buildMeshletsScan(meshlets.data(), vertices.data(), corners.data(), indices.data(),
+                                        indices.size(), local.position.size(), mostVertices, kTriangles)
+            : meshopt_buildMeshlets(meshlets.data(), vertices.data(), corners.data(), indices.data(), indices.size(),
+                                    &local.position[0].x, local.position.size(), sizeof(glm::vec3), mostVertices,
+                                    kTriangles, 0.0f);
     meshlets.resize(count);
     for (const meshopt_Meshlet& m : meshlets) {
         Cluster c;
-        c.producer = producer;
         c.indices.reserve(size_t{m.triangle_count} * 3);
         for (size_t k = 0; k < size_t{m.triangle_count} * 3; ++k)
             c.indices.push_back(local.global[vertices[m.vertex_offset + corners[m.triangle_offset + k]]]);
@@ -100,7 +107,7 @@ std::vector<Cluster> makeClusters(const WeldedMesh& mesh, const std::vector<uint
                        last = static_cast<ptrdiff_t>(3 * std::min(triangles, (b + 1) * kBlockTriangles));
             block.indices.assign(indices.begin() + first, indices.begin() + last);
             const LocalMesh local = makeLocal(mesh, {&block});
-            appendClusters(local, local.indices, kNoProducer, true, parts[b]);
+            appendClusters(local, local.indices, Triangles::alongCurve, parts[b]);
         }
     });
     std::vector<Cluster> all;

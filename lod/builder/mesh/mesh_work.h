@@ -135,9 +135,14 @@ struct LocalMesh {
 };
 LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& clusters);
 
-/// Cuts triangles into clusters of at most kClusterTriangles and kClusterVertices. Where they stand along a curve that
-/// fills space, runs of them are compact as they are, at a fraction of the time.
-void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, uint32_t producer, bool isAlongCurve,
+/// What the triangles that are cut into clusters are like.
+enum class Triangles {
+    alongCurve,  ///< they stand along a curve that fills space: runs of them are compact as they are
+    small,       ///< many and of about one size: such a curve is laid through them
+    any          ///< neighbours are put together, at several times the time
+};
+/// Cuts triangles into clusters of at most kClusterTriangles and kClusterVertices.
+void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, Triangles triangles,
                     std::vector<Cluster>& out);
 std::vector<Cluster> makeClusters(const WeldedMesh& mesh, const std::vector<uint32_t>& indices, Executor& executor);
 

@@ -201,7 +201,7 @@ void appendWholeClusters(const LocalMesh& local, const std::vector<std::vector<u
             continue;
         }
         const size_t first = out.size();
-        appendClusters(local, part, kNoProducer, false, out);
+        appendClusters(local, part, Triangles::any, out);
         for (size_t c = first; c < out.size(); ++c) {
             out[c].isWhole = true;
             out[c].isContinued = c > first;
