@@ -49,7 +49,7 @@ bool isPicture(const std::string& path) {
 /// Stores that the nodes of a .gltf or .glb place.
 std::vector<std::string> storesOf(const std::string& path) {
     if (lod::fileKindOf(path) != lod::FileKind::glb && fs::path(path).extension() != ".gltf") return {};
-    const auto container = scene::gltf::readContainer(path);
+    const auto container = scene::gltf::readContainerJson(path);
     if (!container || !container->json.contains("nodes") || !container->json["nodes"].is_array()) return {};
     std::vector<std::string> stores;
     for (const nlohmann::json& node : container->json["nodes"]) {

@@ -76,7 +76,7 @@ std::vector<std::string> filesOf(const std::string& path) {
     if (kind == lod::FileKind::other && extension == ".obj") {
         files = filesOfObj(path);
     } else if (kind == lod::FileKind::glb || extension == ".gltf") {
-        const auto container = gltf::readContainer(path);
+        const auto container = gltf::readContainerJson(path);
         if (!container) return {};
         std::vector<std::string> uris;
         collectUris(container->json, uris);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "engine/base/huge_buffer.h"
 #include "engine/scene/gltf/json_tools.h"
 #include "engine/scene/gltf/semantics.h"
 
@@ -79,6 +80,16 @@ double component(const uint8_t* at, int type, bool normalised) {
     }
 }
 
+/// What component() gives of floats that stand side by side in each element.
+void widenFloats(const uint8_t* from, size_t count, size_t stride, size_t components, double* to) {
+    for (size_t i = 0; i < count; ++i, from += stride)
+        for (size_t k = 0; k < components; ++k) {
+            float value = 0;
+            std::memcpy(&value, from + k * sizeof(float), sizeof(float));
+            *to++ = static_cast<double>(value);
+        }
+}
+
 /// Byte offset of each component within an element (matrix columns are padded to four bytes).
 std::vector<size_t> componentOffsets(const std::string& type, int componentType) {
     const size_t bytes = componentBytes(componentType), count = componentsOf(type);
@@ -112,7 +123,7 @@ Result<void> Buffers::load(Problems& problems) {
         if (!buffers[i].contains("uri")) {
             if (i == 0 && container_.hasBinaryChunk) {
                 STIPPLE_TRY(claim(container_.binary.size(), "the buffers"));
-                buffers_[0] = container_.binary;
+                buffers_[0] = std::move(container_.binary);
             }
             continue;  // otherwise the empty proxy of a compressed one
         }
@@ -197,7 +208,8 @@ Result<std::vector<double>> Buffers::values(size_t index) {
     constexpr uint64_t kEach = sizeof(double);
     STIPPLE_TRY(fits(count > UINT64_MAX / kEach / offsets.size() ? UINT64_MAX : count * offsets.size() * kEach,
                      fmt::format("/accessors/{} with {} elements", index, count)));
-    std::vector<double> out(count * offsets.size(), 0.0);
+    std::vector<double> out;
+    resizeHuge(out, count * offsets.size());
     if (count == 0) return out;
     if (a.contains("bufferView")) {
         const auto viewIndex = a["bufferView"].get<size_t>();
@@ -209,7 +221,9 @@ Result<std::vector<double>> Buffers::values(size_t index) {
             return fail(ErrorKind::input, "reaches beyond its buffer view",
                         fmt::format("{}: /accessors/{}", container_.path, index));
         const bool normalised = a.value("normalized", false);
-        for (size_t i = 0; i < count; ++i)
+        const bool isPlain = componentType == 5126 && offsets.back() == (offsets.size() - 1) * sizeof(float);
+        if (isPlain) widenFloats(bytes.data() + first, count, stride, offsets.size(), out.data());
+        for (size_t i = 0; i < count && !isPlain; ++i)
             for (size_t k = 0; k < offsets.size(); ++k)
                 out[i * offsets.size() + k] =
                     component(bytes.data() + first + i * stride + offsets[k], componentType, normalised);

@@ -14,10 +14,9 @@ namespace stipple::scene::gltf {
 class Buffers {
   public:
     /// `container` must outlive it; its structure and extents must have been checked.
-    explicit Buffers(const Container& container, ReadSettings settings = {})
-        : container_(container), settings_(settings) {}
-    /// Loads every buffer; an error names the one that is missing. One that is too short is a fault that matters only
-    /// where something lies in what is missing.
+    explicit Buffers(Container& container, ReadSettings settings = {}) : container_(container), settings_(settings) {}
+    /// Loads every buffer, the container's own by taking it; an error names the one that is missing. One that is too
+    /// short is a fault that matters only where something lies in what is missing.
     Result<void> load(Problems& problems);
     /// The bytes of a buffer view, decompressed if it is compressed.
     Result<std::span<const uint8_t>> view(size_t index);
@@ -40,7 +39,7 @@ class Buffers {
     Result<void> decompress(size_t index);
     Result<void> addSparse(const nlohmann::json& accessor, size_t components, std::vector<double>& values);
 
-    const Container& container_;
+    Container& container_;
     ReadSettings settings_;
     uint64_t claimedBytes_ = 0;
     std::vector<std::vector<uint8_t>> buffers_;

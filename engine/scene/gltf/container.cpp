@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <set>
 
 #include "engine/base/file.h"
+#include "engine/base/huge_buffer.h"
 #include "engine/scene/read_settings.h"
 
 namespace stipple::scene::gltf {
@@ -15,10 +17,11 @@ namespace {
 constexpr uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 constexpr int kDeepestJson = 64;
 
-uint32_t wordAt(const std::vector<uint8_t>& bytes, size_t at) {
-    uint32_t v = 0;
-    std::memcpy(&v, bytes.data() + at, 4);
-    return v;
+template <size_t count>
+Result<std::array<uint32_t, count>> wordsAt(const ByteSource& file, uint64_t at) {
+    std::array<uint32_t, count> words{};
+    STIPPLE_TRY(file.readAt(at, words.data(), sizeof(words)));
+    return words;
 }
 
 /// Looks for what the parser lets pass: keys that stand twice, and depth (it would recurse when freeing).
@@ -143,31 +146,34 @@ tl::unexpected<Error> refuseVersion1(const std::string& path) {
     return fail(ErrorKind::input, "is glTF 1.0, 2.0 is read", path, "convert it, e.g. with gltf-pipeline");
 }
 
-Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c, uint64_t memoryBytes) {
+Result<void> readBinaryForm(const ByteSource& file, Container& c, uint64_t memoryBytes, Want want) {
     const auto bad = [&](const std::string& what) {
         return fail(ErrorKind::input, what, c.path, "the .glb file is damaged");
     };
-    if (bytes.size() < 12) return bad(fmt::format("has {} bytes, a .glb header has 12", bytes.size()));
-    if (wordAt(bytes, 4) == 1) return refuseVersion1(c.path);
-    if (wordAt(bytes, 4) != 2) return bad(fmt::format("has .glb version {}, expected 2", wordAt(bytes, 4)));
-    size_t length = wordAt(bytes, 8);
-    if (length > bytes.size()) {  // all the same if the chunks are whole
-        c.oddities.push_back(fmt::format("says it has {} bytes, but has {}", length, bytes.size()));
-        length = bytes.size();
+    const uint64_t bytes = c.fileBytes;
+    if (bytes < 12) return bad(fmt::format("has {} bytes, a .glb header has 12", bytes));
+    STIPPLE_ASSIGN(const auto head, wordsAt<3>(file, 0));
+    if (head[1] == 1) return refuseVersion1(c.path);
+    if (head[1] != 2) return bad(fmt::format("has .glb version {}, expected 2", head[1]));
+    uint64_t length = head[2];
+    if (length > bytes) {  // all the same if the chunks are whole
+        c.oddities.push_back(fmt::format("says it has {} bytes, but has {}", length, bytes));
+        length = bytes;
     }
     if (length < 20) return bad(fmt::format("has {} bytes, too few for a chunk", length));
     c.isBinary = true;
     bool hasJson = false;
-    size_t at = 12;
+    uint64_t at = 12;
     for (int chunk = 0; at < length; ++chunk) {  // what follows is not part of it
         if (length - at < 8) return bad(fmt::format("ends within the head of chunk {} at offset {}", chunk, at));
-        const uint32_t size = wordAt(bytes, at), type = wordAt(bytes, at + 4);
+        STIPPLE_ASSIGN(const auto chunkHead, wordsAt<2>(file, at));
+        const auto [size, type] = chunkHead;
         if (size % 4 != 0)
             c.oddities.push_back(
                 fmt::format("chunk {} at offset {} has {} bytes, not a multiple of 4", chunk, at, size));
-        if (size > bytes.size() - at - 8)
-            return bad(fmt::format("chunk {} at offset {} has {} bytes, only {} are left", chunk, at, size,
-                                   bytes.size() - at - 8));
+        if (size > bytes - at - 8)
+            return bad(
+                fmt::format("chunk {} at offset {} has {} bytes, only {} are left", chunk, at, size, bytes - at - 8));
         if (size > length - at - 8) {
             c.oddities.push_back(fmt::format("says it has {} bytes, but chunk {} ends later", length, chunk));
             length = at + 8 + size;
@@ -178,53 +184,60 @@ Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c, uin
             return bad(fmt::format("chunk {} at offset {} is a second JSON chunk", chunk, at));
         if (type == kBinaryChunk && c.hasBinaryChunk) {
             c.oddities.push_back(fmt::format("chunk {} at offset {} is a second binary chunk", chunk, at));
-            at += 8 + size_t{size};
+            at += 8 + uint64_t{size};
             continue;
         }
         if (type == kBinaryChunk && chunk != 1)
             c.oddities.push_back(
                 fmt::format("chunk {} at offset {} is a binary chunk, which must be the second", chunk, at));
         if (size == 0 && type != kBinaryChunk) return bad(fmt::format("chunk {} at offset {} is empty", chunk, at));
-        const auto* begin = bytes.data() + at + 8;
         if (type == kJsonChunk) {
-            const auto* text = reinterpret_cast<const char*>(begin);
-            STIPPLE_ASSIGN(c.json, parseJson(text, text + size, c, memoryBytes));
+            std::vector<char> text(size);
+            STIPPLE_TRY(file.readAt(at + 8, text.data(), size));
+            STIPPLE_ASSIGN(c.json, parseJson(text.data(), text.data() + size, c, memoryBytes));
             hasJson = true;
         } else if (type == kBinaryChunk) {
-            c.binary.assign(begin, begin + size);
             c.hasBinaryChunk = true;
+            if (want == Want::all) {
+                resizeHuge(c.binary, size);
+                STIPPLE_TRY(file.readAt(at + 8, c.binary.data(), size));
+            }
         }
-        at += 8 + size_t{size};
+        at += 8 + uint64_t{size};
     }
     return hasJson ? Result<void>() : bad("holds no JSON chunk");
 }
 
 }  // namespace
 
-Result<Container> readContainer(const std::string& path, uint64_t memoryBytes) {
+Result<Container> readContainer(const std::string& path, uint64_t memoryBytes, Want want) {
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
-    return readContainer(file, memoryBytes);
+    return readContainer(file, memoryBytes, want);
 }
 
-Result<Container> readContainer(const ByteSource& file, uint64_t memoryBytes) {
+Result<Container> readContainer(const ByteSource& file, uint64_t memoryBytes, Want want) {
     const std::string& path = file.path();
     Container c;
     c.path = path;
     c.folder = std::filesystem::path(path).parent_path().string();
     c.fileBytes = file.sizeBytes();
-    if (2 * c.fileBytes > memoryBytes)  // the file, and the chunks of it
+    if (want == Want::all && 2 * c.fileBytes > memoryBytes)  // its chunks, and what is made of them
         return overBudget("is read as a whole, which", 2 * c.fileBytes, memoryBytes, path);
     if (c.fileBytes == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
-    std::vector<uint8_t> bytes(c.fileBytes);
-    STIPPLE_TRY(file.readAt(0, bytes.data(), bytes.size()));
     const bool isNamedBinary = std::filesystem::path(path).extension() == ".glb";
-    if (bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0) {
-        STIPPLE_TRY(readBinaryForm(bytes, c, memoryBytes));
-        return c;
+    if (c.fileBytes >= 4) {
+        STIPPLE_ASSIGN(const auto first, wordsAt<1>(file, 0));
+        if (std::memcmp(first.data(), "glTF", 4) == 0) {
+            STIPPLE_TRY(readBinaryForm(file, c, memoryBytes, want));
+            return c;
+        }
     }
     if (isNamedBinary) return fail(ErrorKind::input, "does not begin with glTF", path, "is it a .glb file?");
-    const auto* text = reinterpret_cast<const char*>(bytes.data());
-    STIPPLE_ASSIGN(c.json, parseJson(text, text + bytes.size(), c, memoryBytes));
+    if (2 * c.fileBytes > memoryBytes)
+        return overBudget("is read as a whole, which", 2 * c.fileBytes, memoryBytes, path);
+    std::vector<char> text(c.fileBytes);
+    STIPPLE_TRY(file.readAt(0, text.data(), text.size()));
+    STIPPLE_ASSIGN(c.json, parseJson(text.data(), text.data() + text.size(), c, memoryBytes));
     // Its lists are objects, by names.
     if (const auto lists = c.json.find("accessors"); lists != c.json.end() && lists->is_object())
         return refuseVersion1(path);

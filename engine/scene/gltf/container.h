@@ -21,8 +21,16 @@ struct Container {  // NOLINT(bugprone-exception-escape): moving JSON checks its
     std::vector<std::string> oddities;  ///< not as the format has it, and passed over
 };
 
+/// Of a .glb: both chunks, or the JSON alone, which a few reads of any file give.
+enum class Want { all, json };
 /// `.gltf` or `.glb`, told by content. Errors name the offset. What would take more than `memoryBytes` is refused.
-Result<Container> readContainer(const ByteSource& file, uint64_t memoryBytes = uint64_t{2} << 30);
-Result<Container> readContainer(const std::string& path, uint64_t memoryBytes = uint64_t{2} << 30);
+Result<Container> readContainer(const ByteSource& file, uint64_t memoryBytes = uint64_t{2} << 30,
+                                Want want = Want::all);
+Result<Container> readContainer(const std::string& path, uint64_t memoryBytes = uint64_t{2} << 30,
+                                Want want = Want::all);
+/// What it says of itself, whatever it holds.
+inline Result<Container> readContainerJson(const std::string& path) {
+    return readContainer(path, uint64_t{2} << 30, Want::json);
+}
 
 }  // namespace stipple::scene::gltf
