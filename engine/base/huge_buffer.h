@@ -1,5 +1,5 @@
 // Large arrays on huge pages where the system grants them: per-pixel buffers are written all over, and with 4 KiB
-// pages a third of the projection's time goes into page table walks; buckets of a build are touched once, page by page.
+// pages a third of the projection's time goes into page table walks.
 #pragma once
 
 #include <sys/mman.h>
@@ -34,21 +34,17 @@ class HugeBuffer {
     std::unique_ptr<T, Free> data_;
 };
 
-/// Room for `count` in a vector, which is emptied if it has to grow, on huge pages as far as they fit into it.
-template <typename T>
-void reserveHuge(std::vector<T>& of, size_t count) {
-    constexpr uintptr_t kHuge = uintptr_t{2} << 20;
-    if (count <= of.capacity()) return;
-    of = {};
-    of.reserve(count);
-    const auto first = reinterpret_cast<uintptr_t>(of.data());
-    const uintptr_t begin = (first + kHuge - 1) / kHuge * kHuge, end = (first + count * sizeof(T)) / kHuge * kHuge;
-    if (begin < end) ::madvise(reinterpret_cast<char*>(of.data()) + (begin - first), end - begin, MADV_HUGEPAGE);
-}
-/// Resizes a vector in that way: what it held is only kept where there was room.
+/// Resizes a vector, on huge pages as far as they fit into it; what it held is only kept where there was room.
 template <typename T>
 void resizeHuge(std::vector<T>& of, size_t count) {
-    reserveHuge(of, count);
+    constexpr uintptr_t kHuge = uintptr_t{2} << 20;
+    if (count > of.capacity()) {
+        of = {};
+        of.reserve(count);
+        const auto first = reinterpret_cast<uintptr_t>(of.data());
+        const uintptr_t begin = (first + kHuge - 1) / kHuge * kHuge, end = (first + count * sizeof(T)) / kHuge * kHuge;
+        if (begin < end) ::madvise(reinterpret_cast<char*>(of.data()) + (begin - first), end - begin, MADV_HUGEPAGE);
+    }
     of.resize(count);
 }
 

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "engine/base/check.h"
 #include "engine/base/file.h"
 #include "engine/base/hash.h"
 
@@ -16,8 +17,7 @@ Result<void> Spill::append(std::span<const uint8_t> bytes) {
         const std::span<uint8_t> room = region_->part(part_);
         if (bytes.size() > room.size() || at > room.size() - bytes.size()) {
             bytes_ -= bytes.size();
-            return fail(ErrorKind::input, "the input changed while it was read: it holds more than before", path_,
-                        "build again when it is complete");
+            return fail(ErrorKind::input, "changed while it was read", "", "build again when it is complete");
         }
         std::memcpy(room.data() + at, bytes.data(), bytes.size());
         return {};
@@ -36,6 +36,7 @@ Result<std::vector<uint8_t>> Spill::part(uint64_t offset, uint64_t count) const 
     if (path_.empty()) {
         const std::span<const uint8_t> all =
             region_ != nullptr ? std::span<const uint8_t>(region_->part(part_)) : memory_;
+        STIPPLE_CHECK(offset <= all.size() && count <= all.size() - offset, "a part of what is there");
         const std::span<const uint8_t> wanted = all.subspan(offset, count);
         return std::vector<uint8_t>(wanted.begin(), wanted.end());
     }

@@ -23,7 +23,8 @@ class Spill {
         region_ = &region;
         part_ = part;
     }
-    /// From several threads; what one call brings stays together.
+    /// From several threads; what one call brings stays together. What a region has no room for is an error without a
+    /// name: whoever appends knows of what.
     Result<void> append(std::span<const uint8_t> bytes);
 
     const std::string& path() const { return path_; }

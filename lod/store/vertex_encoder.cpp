@@ -21,20 +21,20 @@ namespace {
 constexpr uint8_t kHeader = 0xa0;  ///< version 0
 constexpr size_t kGroup = 16, kMostRecords = 256, kBlockBytes = 8192, kLeastTail = 32;
 
-using Bytes [[gnu::vector_size(kGroup)]] = uint8_t;
-using SignedBytes [[gnu::vector_size(kGroup)]] = int8_t;
+using GroupBytes [[gnu::vector_size(kGroup)]] = uint8_t;
+using SignedGroupBytes [[gnu::vector_size(kGroup)]] = int8_t;
 
 /// The same byte of each record of a block.
-using Plane = std::array<uint8_t, kMostRecords>;
+using BytePlane = std::array<uint8_t, kMostRecords>;
 
 size_t recordsOfBlock(size_t stride) { return std::min(kBlockBytes / stride & ~(kGroup - 1), kMostRecords); }
 
 /// Turns 16 rows of 16 bytes into columns: four times each row is put between the bytes of the one eight below.
-void transpose(std::array<Bytes, kGroup>& rows) {
+void transpose(std::array<GroupBytes, kGroup>& rows) {
     for (int round = 0; round < 4; ++round) {
-        std::array<Bytes, kGroup> next;
+        std::array<GroupBytes, kGroup> next;
         for (size_t i = 0; i < kGroup / 2; ++i) {
-            const Bytes a = rows[i], b = rows[i + kGroup / 2];
+            const GroupBytes a = rows[i], b = rows[i + kGroup / 2];
             next[2 * i] = __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
             next[2 * i + 1] =
                 __builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
@@ -45,19 +45,19 @@ void transpose(std::array<Bytes, kGroup>& rows) {
 
 /// Differences of `count` records from `records`, of the bytes that begin at each: `width` of them, at most 16.
 /// `before`: those of the record in front of the first.
-void takePlanes(const uint8_t* records, size_t count, size_t stride, size_t width, Bytes before,
-                std::array<Plane, kGroup>& planes) {
+void takePlanes(const uint8_t* records, size_t count, size_t stride, size_t width, GroupBytes before,
+                std::array<BytePlane, kGroup>& planes) {
     for (size_t first = 0; first < count; first += kGroup) {
-        std::array<Bytes, kGroup> rows{};
+        std::array<GroupBytes, kGroup> rows{};
         const size_t here = std::min(kGroup, count - first);
         for (size_t r = 0; r < here; ++r) {
-            Bytes row{};
+            GroupBytes row{};
             if (width == kGroup)
                 std::memcpy(&row, records + (first + r) * stride, kGroup);
             else
                 std::memcpy(&row, records + (first + r) * stride, width);
-            const Bytes off = row - before;
-            rows[r] = (off + off) ^ reinterpret_cast<Bytes>(reinterpret_cast<SignedBytes>(off) < 0);
+            const GroupBytes off = row - before;
+            rows[r] = (off + off) ^ reinterpret_cast<GroupBytes>(reinterpret_cast<SignedGroupBytes>(off) < 0);
             before = row;
         }
         transpose(rows);
@@ -66,8 +66,8 @@ void takePlanes(const uint8_t* records, size_t count, size_t stride, size_t widt
 }
 
 /// How many of the bytes are at least `value`.
-size_t countAtLeast(const Bytes& group, uint8_t value) {
-    const Bytes ones = reinterpret_cast<Bytes>(group >= value) & 1;
+size_t countAtLeast(const GroupBytes& group, uint8_t value) {
+    const GroupBytes ones = reinterpret_cast<GroupBytes>(group >= value) & 1;
     std::array<uint64_t, 2> halves{};
     std::memcpy(halves.data(), &ones, kGroup);
     return (halves[0] + halves[1]) * 0x0101010101010101u >> 56;
@@ -88,7 +88,7 @@ uint16_t byTwos(uint64_t bytes) {
 
 /// Writes a group and returns what its header says.
 uint8_t putGroup(const uint8_t* bytes, uint8_t*& to) {
-    Bytes group;
+    GroupBytes group;
     std::memcpy(&group, bytes, kGroup);
     std::array<uint64_t, 2> halves{};
     std::memcpy(halves.data(), bytes, kGroup);
@@ -101,7 +101,7 @@ uint8_t putGroup(const uint8_t* bytes, uint8_t*& to) {
     }
     const bool isTwo = withTwo <= withFour;
     const uint8_t most = isTwo ? 3 : 15;
-    const Bytes capped = group < most ? group : Bytes{} + most;
+    const GroupBytes capped = group < most ? group : GroupBytes{} + most;
     std::memcpy(halves.data(), &capped, kGroup);
     if (isTwo) {
         const std::array<uint16_t, 2> packed{byTwos(halves[0]), byTwos(halves[1])};
@@ -120,7 +120,7 @@ uint8_t putGroup(const uint8_t* bytes, uint8_t*& to) {
     return isTwo ? 1 : 2;
 }
 
-uint8_t* putPlane(const Plane& plane, size_t count, uint8_t* to) {
+uint8_t* putPlane(const BytePlane& plane, size_t count, uint8_t* to) {
     const size_t groups = (count + kGroup - 1) / kGroup;
     uint8_t* const headers = to;
     to += (groups + 3) / 4;
@@ -141,14 +141,14 @@ std::span<const uint8_t> encodeVertices(const void* records, size_t count, size_
     uint8_t* to = scratch.data();
     *to++ = kHeader;
     const auto* const first = static_cast<const uint8_t*>(records);
-    std::array<Plane, kGroup> planes;
+    std::array<BytePlane, kGroup> planes;
     const size_t each = recordsOfBlock(stride);
     for (size_t begin = 0; begin < count; begin += each) {
         const size_t here = std::min(each, count - begin);
         for (size_t column = 0; column < stride; column += kGroup) {
             const size_t width = std::min(kGroup, stride - column);
             const uint8_t* const at = first + begin * stride + column;
-            Bytes before{};
+            GroupBytes before{};
             std::memcpy(&before, begin == 0 ? at : at - stride, width);
             takePlanes(at, here, stride, width, before, planes);
             for (size_t k = 0; k < width; ++k) to = putPlane(planes[k], here, to);

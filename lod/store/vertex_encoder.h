@@ -1,6 +1,6 @@
-// meshoptimizer's codec of vertices, the writing half: the same bytes as meshopt_encodeVertexBuffer (version 0 of the
-// format, which EXT_meshopt_compression describes), several times as fast. A build spends an eighth of its time there;
-// reading stays the library's.
+// meshoptimizer's codec of vertices, the writing half: version 0 of the format, which EXT_meshopt_compression
+// describes, in the bytes that the library's own encoder gave up to its version 0.22, at a fifth of the time, which was
+// an eighth of that of a build. Reading stays the library's.
 #pragma once
 
 #include <cstdint>

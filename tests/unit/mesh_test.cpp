@@ -75,6 +75,72 @@ TEST(PlyMesh, PolygonsAndStripsBecomeTriangles) {
     }
 }
 
+/// The same rows as bytes and as text: `counts` and `corners` are types of PLY.
+std::pair<std::string, std::string> bothEncodings(const std::vector<std::vector<int64_t>>& rows,
+                                                  const std::string& counts, const std::string& corners) {
+    const auto head = [&](const std::string& encoding) {
+        return "ply\nformat " + encoding +
+               " 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nelement face " +
+               std::to_string(rows.size()) + "\nproperty list " + counts + " " + corners +
+               " vertex_indices\nend_header\n";
+    };
+    std::string bytes = head("binary_little_endian"), text = head("ascii");
+    for (int v = 0; v < 6; ++v) {
+        const std::array<float, 3> place{static_cast<float>(v), static_cast<float>(v * v), 1};
+        bytes.append(reinterpret_cast<const char*>(place.data()), sizeof(place));
+        text += std::to_string(v) + " " + std::to_string(v * v) + " 1\n";
+    }
+    for (const std::vector<int64_t>& row : rows) {
+        bytes += static_cast<char>(row.size());
+        text += std::to_string(row.size());
+        for (const int64_t corner : row) {
+            const auto word = static_cast<uint32_t>(corner);
+            bytes.append(reinterpret_cast<const char*>(&word), 4);
+            text += " " + std::to_string(corner);
+        }
+        text += "\n";
+    }
+    return {bytes, text};
+}
+
+TEST(PlyMesh, RowsOfThreeCornersAreReadLikeAnyOthers) {
+    const test::TempFolder folder;
+    uint64_t bad = 0, badOfText = 0;
+    for (const auto& [counts, corners] : {std::pair{"uchar", "int"}, {"char", "int"}, {"uchar", "uint"}}) {
+        // Rows are taken by 4,096: other ones stand there, at both ends, and one after the other.
+        std::vector<std::vector<int64_t>> rows;
+        for (int64_t r = 0; r < 9000; ++r) {
+            const bool isOther = r == 0 || r == 4095 || r == 4096 || r == 4098 || r == 8999;
+            rows.push_back({r % 6, (r + 1) % 6, (r / 6 + 2) % 6});
+            if (isOther) rows.back().push_back((r + 3) % 6);
+            if (r % 1000 == 7) rows.back()[1] = std::string(corners) == "int" ? -1 : 0xfffffff0;
+            if (r % 1000 == 8) rows.back()[2] = 6;
+        }
+        const auto [bytes, text] = bothEncodings(rows, counts, corners);
+        test::spit(folder / "a.ply", bytes);
+        test::spit(folder / "b.ply", text);
+        const auto one = readPlyMesh(folder / "a.ply", bad), other = readPlyMesh(folder / "b.ply", badOfText);
+        ASSERT_TRUE(one) << one.error().line();
+        ASSERT_TRUE(other) << other.error().line();
+        EXPECT_EQ(one->indices.size() / 3, 9000u + 5 - 18);
+        EXPECT_EQ(cornersOf(*one), cornersOf(*other));
+        EXPECT_EQ(bad, 18u);
+        EXPECT_EQ(badOfText, 18u);
+        // Whatever is missing of the last rows is missed.
+        for (size_t length = bytes.size() - 60; length < bytes.size(); ++length) {
+            test::spit(folder / "c.ply", bytes.substr(0, length));
+            const auto cut = readPlyMesh(folder / "c.ply", bad);
+            ASSERT_FALSE(cut) << length;
+            EXPECT_NE(cut.error().line().find("truncated"), std::string::npos) << cut.error().line();
+        }
+    }
+    // A count below zero is none.
+    auto [bytes, text] = bothEncodings({{0, 1, 2}, {1, 2, 3}}, "char", "int");
+    bytes[bytes.size() - 13] = static_cast<char>(-3);
+    test::spit(folder / "d.ply", bytes);
+    EXPECT_FALSE(readPlyMesh(folder / "d.ply", bad));
+}
+
 TEST(PlyMesh, RowsLongerThanABlockAndVerticesBeyondTheMemoryAreTheSame) {
     // A strip of 150,000 corners in one row (read in parts of 65,536), with a break, over a zigzag of vertices; once
     // with all its vertices in memory, once with 512 KiB of 4 MiB.

@@ -80,6 +80,36 @@ TEST(TriangleGrid, TheLeastOfAllDistancesToTheBit) {
         }
 }
 
+TEST(TriangleGrid, NeedlesAcrossAllAxesTakeNoMoreMemoryThanOthers) {
+    Rng rng(7);
+    Triangles of;
+    for (uint32_t t = 0; t < 2000; ++t) {
+        const glm::vec3 a = anywhere(rng, 10), b = 1000.0f - anywhere(rng, 10);
+        for (const glm::vec3& c : {a, b, b + 1e-3f}) {
+            of.indices.push_back(static_cast<uint32_t>(of.position.size()));
+            of.position.push_back(c);
+        }
+    }
+    const TriangleGrid grid(of.position, of.indices, false);
+    EXPECT_LE(grid.items(), size_t{16 * 2000 + 64});
+    for (int k = 0; k < 50; ++k) {
+        const glm::vec3 p = anywhere(rng, 1000);
+        float least = 3e38f;
+        for (uint32_t t = 0; t < 2000; ++t) least = std::min(least, grid.distance(p, t));
+        ASSERT_EQ(grid.leastDistance(p, 0), least);
+    }
+}
+
+TEST(TriangleGrid, WhatIsNoNumberIsNoNearest) {
+    // Products of four lengths of 2^31 and more are no floats.
+    const float far = 0x1p32f;
+    const std::vector<glm::vec3> position{{-far, -far, -far}, {far, -far, far}, {-far, far, far}, {1, 1, 1}};
+    const std::vector<uint32_t> indices{0, 1, 2};
+    const TriangleGrid grid(position, indices, false);
+    for (const glm::vec3& p : {glm::vec3(far, far, -far), glm::vec3(0, 0, far), glm::vec3(1, 2, 3)})
+        EXPECT_GE(grid.leastDistance(p, 0), 0.0f);
+}
+
 TEST(TriangleGrid, IsADistance) {
     Rng rng(6);
     const Triangles of = strewn(40, 2, 1, rng);

@@ -1,10 +1,10 @@
-// The bytes that stores hold are those of meshoptimizer's own encoder.
+// The bytes that stores hold are those of meshoptimizer's own encoder, and its decoder reads them.
 #include "lod/store/vertex_encoder.h"
 
 #include <gtest/gtest.h>
 #include <meshoptimizer.h>
 
-#include <cstring>
+#include <algorithm>
 
 #include "engine/base/rng.h"
 
@@ -43,8 +43,11 @@ TEST(VertexEncoder, WritesWhatTheLibraryWrites) {
                 std::vector<uint8_t> theirs(meshopt_encodeVertexBufferBound(count, stride));
                 theirs.resize(meshopt_encodeVertexBuffer(theirs.data(), theirs.size(), records.data(), count, stride));
                 const std::span<const uint8_t> ours = encodeVertices(records.data(), count, stride, scratch);
-                ASSERT_TRUE(std::equal(ours.begin(), ours.end(), theirs.begin(), theirs.end()))
-                    << "stride " << stride << ", " << count << " records, kind " << kind;
+                // (Later versions choose otherwise where two and four bits take as much.)
+                if (MESHOPTIMIZER_VERSION < 230)
+                    ASSERT_TRUE(std::equal(ours.begin(), ours.end(), theirs.begin(), theirs.end()))
+                        << "stride " << stride << ", " << count << " records, kind " << kind;
+                ASSERT_EQ(ours.size(), theirs.size());
                 std::vector<uint8_t> back(records.size());
                 ASSERT_EQ(meshopt_decodeVertexBuffer(back.data(), count, stride, ours.data(), ours.size()), 0);
                 ASSERT_EQ(back, records);

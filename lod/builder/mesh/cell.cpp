@@ -357,7 +357,7 @@ class CellReducer {
                 takeMoved(local, made);
                 appendParts(local, coarse, made.products);
             } else {
-                appendClusters(local, coarse, inside.empty() ? Triangles::small : Triangles::any, made.products);
+                appendClusters(local, coarse, inside.empty() ? Triangles::ofInput : Triangles::any, made.products);
             }
         }
         made.isSimplified = true;

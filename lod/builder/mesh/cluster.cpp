@@ -67,12 +67,12 @@ LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& c
 void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& given, Triangles triangles,
                     std::vector<Cluster>& out) {
     std::vector<uint32_t> alongCurve;
-    if (triangles == Triangles::small) {
+    if (triangles == Triangles::ofInput) {
         alongCurve.resize(given.size());
         meshopt_spatialSortTriangles(alongCurve.data(), given.data(), given.size(), &local.position[0].x,
                                      local.position.size(), sizeof(glm::vec3));
     }
-    const std::vector<uint32_t>& indices = triangles == Triangles::small ? alongCurve : given;
+    const std::vector<uint32_t>& indices = triangles == Triangles::ofInput ? alongCurve : given;
     // (Coordinates of 64 bits take two places.)
     const size_t mostVertices = local.isWide ? shared::kClusterVertices / 2 : shared::kClusterVertices;
     constexpr size_t kTriangles = shared::kClusterTriangles;

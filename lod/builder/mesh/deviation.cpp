@@ -12,6 +12,7 @@
 
 #include "lod/builder/mesh/mesh_work.h"
 #include "lod/builder/mesh/triangle_grid.h"
+#include "lod/primitives/triangle.h"
 
 namespace stipple::lod {
 namespace {
@@ -20,7 +21,7 @@ constexpr int kColourStep = 48;  ///< sRGB steps from which colours count as dif
 
 struct Nearest {
     float distance = 3e38f;
-    uint32_t triangle = 0;  ///< or one near it
+    uint32_t triangle = 0;  ///< or one that is probably not far
 };
 
 using Triple = std::array<uint32_t, 3>;

@@ -138,7 +138,7 @@ LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& c
 /// What the triangles that are cut into clusters are like.
 enum class Triangles {
     alongCurve,  ///< they stand along a curve that fills space: runs of them are compact as they are
-    small,       ///< many and of about one size: such a curve is laid through them
+    ofInput,     ///< the first that are simplified, half of all: such a curve is laid through them
     any          ///< neighbours are put together, at several times the time
 };
 /// Cuts triangles into clusters of at most kClusterTriangles and kClusterVertices.

@@ -4,13 +4,15 @@
 #include <cmath>
 
 #include "engine/base/wide.h"
+#include "lod/primitives/triangle.h"
 
 namespace stipple::lod {
 namespace {
 
 constexpr size_t kAtOnce = 8;
 constexpr float kMostCells = 48;  ///< along an axis
-constexpr float kFar = 1e38f;     ///< more than any square of a distance
+constexpr float kMostSquare = 1e38f, kMostDistance = 1e19f;
+constexpr uint64_t kMostItems = 16;  ///< a triangle, on average; needles that lie across the axes would be everywhere
 
 using Eight [[gnu::vector_size(4 * kAtOnce)]] = float;
 using EightAnywhere [[gnu::vector_size(4 * kAtOnce), gnu::may_alias, gnu::aligned(4)]] = float;
@@ -23,7 +25,7 @@ using EightAnywhere [[gnu::vector_size(4 * kAtOnce), gnu::may_alias, gnu::aligne
 STIPPLE_WIDE static float leastSquare(const TriangleGrid::Columns& columns, size_t first, size_t last,
                                       const float (&p)[3]) {
     const float px = p[0], py = p[1], pz = p[2];
-    Eight least = Eight{} + kFar;
+    Eight least = Eight{} + kMostSquare;
     for (; first < last; first += kAtOnce) {
         const auto* const at = columns.data();
         const Eight ax = *reinterpret_cast<const EightAnywhere*>(at[0].data() + first),
@@ -85,19 +87,39 @@ TriangleGrid::TriangleGrid(const std::vector<glm::vec3>& position, const std::ve
     const float cell =
         std::max({static_cast<float>(std::sqrt(area / std::max(1.0, static_cast<double>(triangles))) * 2.0),
                   std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) / kMostCells, 1e-3f});
-    lo_ = lo;
-    perCell_ = 1 / cell;
-    for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) * perCell_);
+    chooseCells(lo, hi, cell);
     placeItems();
     if (wantsEach) makeSpheres();
+}
+
+/// Of that edge, or of twice as much, and so on, until there are few enough items.
+void TriangleGrid::chooseCells(const glm::vec3& lo, const glm::vec3& hi, float edge) {
+    lo_ = lo;
+    const uint64_t triangles = indices_.size() / 3;
+    for (uint64_t items = ~uint64_t{0}; items > kMostItems * triangles + 64; edge *= 2) {
+        edge_ = edge;
+        perCell_ = 1 / edge;
+        for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) * perCell_);
+        items = 0;
+        for (uint32_t t = 0; t < triangles; ++t) {
+            const glm::u64vec3 cells(lastCell(t) - firstCell(t) + 1);
+            items += cells.x * cells.y * cells.z;
+        }
+    }
+}
+
+glm::ivec3 TriangleGrid::firstCell(uint32_t t) const {
+    return cellOf(glm::min(corner(t, 0), glm::min(corner(t, 1), corner(t, 2))));
+}
+glm::ivec3 TriangleGrid::lastCell(uint32_t t) const {
+    return cellOf(glm::max(corner(t, 0), glm::max(corner(t, 1), corner(t, 2))));
 }
 
 void TriangleGrid::placeItems() {
     start_.assign(static_cast<size_t>(size_.x) * static_cast<size_t>(size_.y) * static_cast<size_t>(size_.z) + 1, 0);
     const auto forCells = [&](const auto& use) {
         for (uint32_t t = 0; t < indices_.size() / 3; ++t) {
-            const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
-            const glm::ivec3 from = cellOf(glm::min(a, glm::min(b, c))), to = cellOf(glm::max(a, glm::max(b, c)));
+            const glm::ivec3 from = firstCell(t), to = lastCell(t);
             for (int z = from.z; z <= to.z; ++z)
                 for (int y = from.y; y <= to.y; ++y)
                     for (int x = from.x; x <= to.x; ++x) use(t, start_[number(x, y, z)]);
@@ -140,19 +162,37 @@ float TriangleGrid::leastInRow(const glm::vec3& p, int x0, int x1, int y, int z)
     return std::sqrt(leastSquare(columns_, start_[number(x0, y, z)], start_[number(x1, y, z) + 1], {p.x, p.y, p.z}));
 }
 
+float TriangleGrid::distance(const glm::vec3& p, uint32_t t) const {
+    const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+    const glm::vec2 w = closestWeights(p, a, b, c);
+    return glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
+}
+
 float TriangleGrid::leastDistance(const glm::vec3& p, uint32_t hint, float enough) const {
     // What lies in the same cell first: the ball is much smaller afterwards.
     const glm::ivec3 own = cellOf(p);
     const size_t cell = number(own.x, own.y, own.z);
-    float least = start_[cell] == start_[cell + 1] ? distance(p, hint) : leastInRow(p, own.x, own.x, own.y, own.z);
+    // (What is no number is not less than that.)
+    float least = start_[cell] == start_[cell + 1] ? std::min(kMostDistance, distance(p, hint))
+                                                   : leastInRow(p, own.x, own.x, own.y, own.z);
     if (least <= enough) return least;
     const glm::ivec3 from = cellOf(p - least), to = cellOf(p + least);
     if (from == to) return least;
-    for (int z = from.z; z <= to.z; ++z)
+    // How far a row is at least, a little less for what rounding makes of it: along y and along z. (Cells at the border
+    // hold what lies beyond, too.)
+    const auto off = [&](int a, int at) {
+        const float first = lo_[a] + static_cast<float>(at) * edge_;
+        const float below = first - p[a], above = at + 1 < size_[a] ? p[a] - (first + edge_) : 0;
+        return std::max({0.0f, below, above}) - 0.01f * edge_;
+    };
+    for (int z = from.z; z <= to.z; ++z) {
+        if (off(2, z) > least) continue;
         for (int y = from.y; y <= to.y; ++y) {
+            if (off(1, y) > least) continue;
             least = std::min(least, leastInRow(p, from.x, to.x, y, z));
             if (least <= enough) return least;
         }
+    }
     return least;
 }
 

@@ -6,8 +6,6 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "lod/primitives/triangle.h"
-
 namespace stipple::lod {
 
 class TriangleGrid {
@@ -16,15 +14,15 @@ class TriangleGrid {
     TriangleGrid(const std::vector<glm::vec3>& position, const std::vector<uint32_t>& indices, bool wantsEach);
 
     const glm::vec3& corner(uint32_t t, size_t k) const { return position_[indices_[3 * size_t{t} + k]]; }
-    float distance(const glm::vec3& p, uint32_t t) const {
-        const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
-        const glm::vec2 w = closestWeights(p, a, b, c);
-        return glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
-    }
+    /// In the units of the positions; so are all distances here.
+    float distance(const glm::vec3& p, uint32_t t) const;
 
-    /// The least distance(), to the bit; one that is not more than `enough` may be that of another triangle. `hint`:
-    /// one that is probably not far.
+    /// The least distance() of the triangles that reach into a ball of that radius, to the bit; one that is not more
+    /// than `enough` may be that of another triangle. `hint`: one that is probably not far.
     float leastDistance(const glm::vec3& p, uint32_t hint, float enough = 0) const;
+
+    /// Of all cells together: triangles that stand in several count several times.
+    size_t items() const { return items_.size(); }
 
     /// Calls isEnough(triangle) for all that may be nearer to p than `limit`, which it lowers, until it says that it
     /// has seen enough; some are visited twice.
@@ -66,6 +64,9 @@ class TriangleGrid {
                    static_cast<size_t>(size_.x) +
                static_cast<size_t>(x);
     }
+    void chooseCells(const glm::vec3& lo, const glm::vec3& hi, float edge);
+    glm::ivec3 firstCell(uint32_t t) const;
+    glm::ivec3 lastCell(uint32_t t) const;
     /// Least distance from the triangles of the cells x0 to x1, and perhaps from others.
     float leastInRow(const glm::vec3& p, int x0, int x1, int y, int z) const;
     void placeItems();
@@ -74,7 +75,7 @@ class TriangleGrid {
     const std::vector<glm::vec3>& position_;
     const std::vector<uint32_t>& indices_;
     glm::vec3 lo_{0};
-    float perCell_ = 1;
+    float edge_ = 1, perCell_ = 1;
     glm::ivec3 size_{1};
     std::vector<uint32_t> start_, items_;  ///< of each cell where its triangles begin; their numbers
     Columns columns_;                      ///< of the items

@@ -5,16 +5,17 @@
 #include <meshoptimizer.h>
 
 #include "lod/builder/octree/bytes.h"
+#include "lod/store/vertex_encoder.h"
 
 namespace stipple::lod {
 
 template <typename T>
 void putPacked(const std::vector<T>& values, ByteWriter& to) {
     static_assert(sizeof(T) % 4 == 0 && sizeof(T) <= 256);
-    std::vector<uint8_t> bytes(meshopt_encodeVertexBufferBound(values.size(), sizeof(T)));
-    bytes.resize(meshopt_encodeVertexBuffer(bytes.data(), bytes.size(), values.data(), values.size(), sizeof(T)));
+    thread_local std::vector<uint8_t> scratch;
+    const std::span<const uint8_t> bytes = encodeVertices(values.data(), values.size(), sizeof(T), scratch);
     to.put(uint64_t{values.size()});
-    to.put(bytes);
+    to.put(std::vector<uint8_t>(bytes.begin(), bytes.end()));
 }
 
 /// Appends; false if the bytes are not what putPacked wrote.

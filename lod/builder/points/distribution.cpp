@@ -142,6 +142,12 @@ Result<void> Distribution::announce() const {
     return workspace_.announce(input_.points * layout_.bytes() + atBorders * layout_.ghostBytes(), progress_);
 }
 
+/// An error that does not say of which file it is: of the input.
+Result<void> Distribution::named(Result<void> result) const {
+    if (!result && result.error().where.empty()) result.error().where = input_.firstPath();
+    return result;
+}
+
 Result<void> Distribution::send() {
     constexpr uint64_t kOften = uint64_t{1} << 26, kShare = 4;  // points between notes, and notes at least
     const uint64_t often = workspace_.isOnDisk() ? std::min(kOften, input_.points / kShare) : input_.points;
@@ -157,8 +163,8 @@ Result<void> Distribution::send() {
                                                         progress_.setTemporaryBytes(temporaryBytes());
                                                     return workspace_.checkStopped();
                                                 });
-        STIPPLE_TRY(agree(ranks, verdict(sent)));
-        STIPPLE_TRY(agree(ranks, distributor.flush()));
+        STIPPLE_TRY(agree(ranks, named(verdict(sent))));
+        STIPPLE_TRY(agree(ranks, named(distributor.flush())));
         if (range.end < input_.parts()) STIPPLE_TRY(note(Journal::What::sent, range.end));
     }
     if (!workspace_.isOnDisk()) return {};

@@ -45,6 +45,7 @@ class Distribution {
     void setFrame();
     void makeBuckets();
     Result<void> announce() const;
+    Result<void> named(Result<void> result) const;
     Result<void> send();
     Result<void> note(Journal::What what, size_t nextPart);
     Result<void> collect();

@@ -198,17 +198,16 @@ Result<uint64_t> PlyReader::readTriangles(const PlyElement& element, uint64_t mo
     STIPPLE_ASSIGN(const uint8_t* const bytes, cursor_.peek(std::min(most, kRows) * kRowBytes, available));
     const uint64_t rows = std::min({most, kRows, available / kRowBytes});
     const bool isSigned = cornerList_->type == PlyType::i32;
-    uint64_t row = 0;
-    list_.resize(3 * rows);
-    for (; row < rows && bytes[row * kRowBytes] == 3; ++row)
-        for (uint64_t k = 0; k < 3; ++k) {
-            uint32_t corner = 0;
-            std::memcpy(&corner, bytes + row * kRowBytes + 1 + 4 * k, 4);
-            list_[3 * row + k] = isSigned ? static_cast<double>(static_cast<int32_t>(corner)) : corner;
-        }
-    list_.resize(3 * row);
-    cursor_.skip(row * kRowBytes);
-    return row;
+    uint64_t triangles = 0;
+    while (triangles < rows && bytes[triangles * kRowBytes] == 3) ++triangles;
+    list_.resize(3 * triangles);
+    for (uint64_t i = 0; i < list_.size(); ++i) {
+        uint32_t corner = 0;
+        std::memcpy(&corner, bytes + i / 3 * kRowBytes + 1 + 4 * (i % 3), 4);
+        list_[i] = isSigned ? static_cast<double>(static_cast<int32_t>(corner)) : corner;
+    }
+    cursor_.skip(triangles * kRowBytes);
+    return triangles;
 }
 
 Result<void> PlyReader::readCorners(uint64_t offset, const std::function<Result<void>(const Corners&)>& take) {
