@@ -120,23 +120,35 @@ float shiftOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<
     return shift + std::min(inTexture > 0 ? moved * std::sqrt(inSpace / inTexture) : longest, 4 * longest);
 }
 
+/// Places near zero, so that fp32 keeps its precision (the group is small), in units in which products of four lengths
+/// are numbers.
+struct NearZero {
+    std::vector<glm::vec3> position;
+    float unit = 1;    ///< lattice units
+    float extent = 0;  ///< largest coordinate
+};
+NearZero nearZero(const LocalMesh& local) {
+    NearZero out;
+    const glm::vec3 shift = local.position[0];
+    for (const glm::vec3& p : local.position) {
+        const glm::vec3 off = glm::abs(p - shift);
+        while (std::max({off.x, off.y, off.z}) > 0x1p31f * out.unit) out.unit *= 2;
+    }
+    out.position.reserve(local.position.size());
+    for (const glm::vec3& p : local.position) {
+        const glm::vec3& q = out.position.emplace_back((p - shift) / out.unit);
+        out.extent = std::max({out.extent, std::abs(q.x), std::abs(q.y), std::abs(q.z)});
+    }
+    return out;
+}
+
 }  // namespace
 
 double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
                         double unimportant, bool isBorderKept) {
-    // Near zero, so that fp32 keeps its precision: the group is small.
-    const glm::vec3 shift = local.position[0];
-    std::vector<glm::vec3> position(local.position.size());
-    // Products of four lengths must be numbers.
-    float extent = 0, unit = 1;
-    for (const glm::vec3& p : local.position) {
-        const glm::vec3 off = glm::abs(p - shift);
-        while (std::max({off.x, off.y, off.z}) > 0x1p31f * unit) unit *= 2;
-    }
-    for (size_t i = 0; i < position.size(); ++i) {
-        position[i] = (local.position[i] - shift) / unit;
-        extent = std::max({extent, std::abs(position[i].x), std::abs(position[i].y), std::abs(position[i].z)});
-    }
+    const NearZero placed = nearZero(local);
+    const std::vector<glm::vec3>& position = placed.position;
+    const float unit = placed.unit, extent = placed.extent;
     LocalMesh near = local;
     near.position = position;
     const bool isAlike = areAlike(mesh, local);
