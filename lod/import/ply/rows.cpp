@@ -220,7 +220,8 @@ Result<void> PlyReader::readCorners(uint64_t offset, const std::function<Result<
         const auto list = std::find_if(element->properties.begin(), element->properties.end(), isCornerList);
         cornerList_ = list == element->properties.end() ? nullptr : &*list;
         isStrip_ = element->name == "tristrips";
-        for (uint64_t r = 0; r < element->count; ++r) {
+        rowsOf_ = &*element;
+        for (uint64_t& r = row_ = 0; r < element->count; ++r) {
             list_.clear();
             isFirst_ = true;
             STIPPLE_ASSIGN(const uint64_t triangles, readTriangles(*element, element->count - r));
@@ -234,13 +235,15 @@ Result<void> PlyReader::readCorners(uint64_t offset, const std::function<Result<
         }
     }
     cornerList_ = nullptr;
+    rowsOf_ = nullptr;
     return {};
 }
 
 tl::unexpected<Error> PlyReader::truncated() const {
-    return fail(ErrorKind::input,
-                fmt::format("ends within element '{}', at vertex {}", vertex_ ? "vertex" : "before vertex", next_),
-                file_->path(), "the file is truncated or its header lies");
+    const std::string where = rowsOf_   ? fmt::format("within element '{}', at row {}", rowsOf_->name, row_)
+                              : vertex_ ? fmt::format("within element 'vertex', at vertex {}", next_)
+                                        : "before element 'vertex'";
+    return fail(ErrorKind::input, "ends " + where, file_->path(), "the file is truncated or its header lies");
 }
 
 Result<void> PlyReader::readRow(const PlyElement& element, double* values) {

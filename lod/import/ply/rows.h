@@ -59,6 +59,8 @@ class PlyReader {
     const PlyElement* vertex_ = nullptr;
     uint64_t next_ = 0;
     bool started_ = false;
+    const PlyElement* rowsOf_ = nullptr;       ///< whose corners are read
+    uint64_t row_ = 0;                         ///< of those
     const PlyProperty* cornerList_ = nullptr;  ///< of the element that is read
     const std::function<Result<void>(const Corners&)>* take_ = nullptr;
     std::vector<double> list_;
