@@ -12,14 +12,15 @@
 
 namespace stipple {
 
+inline constexpr size_t kHugePage = size_t{2} << 20;  ///< bytes
+
 template <typename T>
 class HugeBuffer {
   public:
     /// `count` entries, all `value`.
     void assign(size_t count, T value) {
-        constexpr size_t kHuge = size_t{2} << 20;
-        const size_t bytes = (count * sizeof(T) + kHuge - 1) / kHuge * kHuge;
-        data_.reset(static_cast<T*>(std::aligned_alloc(kHuge, bytes)));
+        const size_t bytes = (count * sizeof(T) + kHugePage - 1) / kHugePage * kHugePage;
+        data_.reset(static_cast<T*>(std::aligned_alloc(kHugePage, bytes)));
         if (!data_) throw std::bad_alloc();
         ::madvise(data_.get(), bytes, MADV_HUGEPAGE);
         std::uninitialized_fill_n(data_.get(), count, value);
@@ -37,12 +38,12 @@ class HugeBuffer {
 /// Resizes a vector, on huge pages as far as they fit into it; what it held is only kept where there was room.
 template <typename T>
 void resizeHuge(std::vector<T>& of, size_t count) {
-    constexpr uintptr_t kHuge = uintptr_t{2} << 20;
     if (count > of.capacity()) {
         of = {};
         of.reserve(count);
         const auto first = reinterpret_cast<uintptr_t>(of.data());
-        const uintptr_t begin = (first + kHuge - 1) / kHuge * kHuge, end = (first + count * sizeof(T)) / kHuge * kHuge;
+        const uintptr_t begin = (first + kHugePage - 1) / kHugePage * kHugePage,
+                        end = (first + count * sizeof(T)) / kHugePage * kHugePage;
         if (begin < end) ::madvise(reinterpret_cast<char*>(of.data()) + (begin - first), end - begin, MADV_HUGEPAGE);
     }
     of.resize(count);
