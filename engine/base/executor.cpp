@@ -147,6 +147,33 @@ void allowThreads(size_t threads) {
     control = new tbb::global_control(kMost, threads);
 }
 
+class DoneAlready final : public Executor::Beside {
+  public:
+    void wait() override {}
+};
+
+class TbbBeside final : public Executor::Beside {
+  public:
+    TbbBeside(tbb::task_arena& arena, const std::function<void()>& task) : arena_(arena) {
+        arena_.execute([&] { group_.run(task); });
+    }
+    ~TbbBeside() noexcept override {
+        if (!isOver_) try {
+                TbbBeside::wait();
+            } catch (...) {  // its caller has given up already
+            }
+    }
+    void wait() override {
+        isOver_ = true;
+        arena_.execute([&] { group_.wait(); });
+    }
+
+  private:
+    tbb::task_arena& arena_;
+    tbb::task_group group_;
+    bool isOver_ = false;
+};
+
 class TbbExecutor final : public Executor {
   public:
     explicit TbbExecutor(int threads) : arena_(threads > 0 ? threads : tbb::task_arena::automatic) {
@@ -171,6 +198,10 @@ class TbbExecutor final : public Executor {
             arena_.execute([&] { group_.run(std::move(task)); });
     }
     void read(std::function<void()> task) override { readers_.run(std::move(task)); }
+    std::unique_ptr<Beside> beside(const std::function<void()>& task) override {
+        if (threads() == 1) return Executor::beside(task);
+        return std::make_unique<TbbBeside>(arena_, task);
+    }
     void wait() override {
         readers_.wait();  // what they start is waited for next
         side_.wait();
@@ -204,6 +235,11 @@ class SerialExecutor final : public Executor {
 }  // namespace
 
 void isolated(const std::function<void()>& work) { tbb::this_task_arena::isolate(work); }
+
+std::unique_ptr<Executor::Beside> Executor::beside(const std::function<void()>& task) {
+    task();
+    return std::make_unique<DoneAlready>();
+}
 
 std::unique_ptr<Executor> makeTbbExecutor(int threads) {
 #ifdef __SANITIZE_THREAD__

@@ -17,6 +17,15 @@ class Executor {
     /// Starts a task that waits for a disk or a network, where no thread of parallelFor has to wait for it. It may call
     /// run() of this executor. It must not throw.
     virtual void read(std::function<void()> task) { run(std::move(task)); }
+    /// A task that goes on beside its caller.
+    class Beside {
+      public:
+        virtual ~Beside() = default;  ///< waits, too
+        /// Once: helps until the task is done, and throws what it threw.
+        virtual void wait() = 0;
+    };
+    /// Starts `task`. With one thread it is done before this returns.
+    virtual std::unique_ptr<Beside> beside(const std::function<void()>& task);
     /// Waits for everything that run() and read() started.
     virtual void wait() = 0;
     virtual int threads() const = 0;

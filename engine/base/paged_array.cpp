@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <utility>
 
+#include "engine/base/huge_buffer.h"
+
 namespace stipple {
 
 PageCache::PageCache(std::string folder, uint64_t memoryBytes)
@@ -70,6 +72,26 @@ void PageCache::change(Slot& slot, uint64_t number) {
         failed("a temporary file cannot be read");
         slot.bytes.assign(kPageBytes, 0);
     }
+}
+
+PagedArray::PagedArray(const std::string& folder, uint64_t memoryBytes, size_t bytes, uint64_t count)
+    : bytes_(bytes), perPage_(PageCache::kPageBytes / bytes) {
+    if (count > memoryBytes / bytes) {
+        pages_.emplace(folder, memoryBytes);
+        return;
+    }
+    parts_ = (count * bytes + kHugePage - 1) / kHugePage;
+    whole_ = std::make_unique<HugeRegion>(std::vector<uint64_t>(parts_, kHugePage));
+    if (parts_ > 0) first_ = whole_->part(0).data();
+}
+
+void PagedArray::forget(uint64_t count) {
+    if (pages_) {
+        pages_->truncate((count + perPage_ - 1) / perPage_);
+        return;
+    }
+    const uint64_t kept = (count * bytes_ + kHugePage - 1) / kHugePage;
+    for (; parts_ > kept; --parts_) whole_->release(parts_ - 1);
 }
 
 }  // namespace stipple

@@ -1,13 +1,15 @@
-// An array of records of which a bounded number of pages is in memory, the rest in a file without a name.
+// An array of records in memory, or of which a bounded number of pages is there and the rest in a file without a name.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "engine/base/huge_region.h"
 #include "engine/base/result.h"
 
 namespace stipple {
@@ -52,18 +54,13 @@ class PageCache {
     std::optional<Error> error_;
 };
 
-/// Records of `bytes` bytes each.
+/// `count` records of `bytes` bytes each: side by side in memory where that suffices, in pages otherwise.
 class PagedArray {
   public:
-    PagedArray(std::string folder, uint64_t memoryBytes, size_t bytes)
-        : pages_(std::move(folder), memoryBytes), bytes_(bytes), perPage_(PageCache::kPageBytes / bytes) {}
-    /// Of what was never written: zeros.
-    void get(uint64_t i, void* to) {
-        std::memcpy(to, pages_.page(i / perPage_, false) + i % perPage_ * bytes_, bytes_);
-    }
-    void set(uint64_t i, const void* from) {
-        std::memcpy(pages_.page(i / perPage_, true) + i % perPage_ * bytes_, from, bytes_);
-    }
+    PagedArray(const std::string& folder, uint64_t memoryBytes, size_t bytes, uint64_t count);
+    /// Valid until the next call. Of what was never written: zeros.
+    const uint8_t* read(uint64_t i) { return at(i, false); }
+    uint8_t* write(uint64_t i) { return at(i, true); }
     /// Makes the first `count` records `bytes` bytes long, no more than before, and forgets the rest.
     template <typename Convert>
     void narrow(uint64_t count, size_t bytes, const Convert& convert) {
@@ -71,21 +68,30 @@ class PagedArray {
         std::vector<uint8_t> before(bytes_), after(bytes);
         const uint64_t perPage = PageCache::kPageBytes / bytes;
         for (uint64_t i = 0; i < count; ++i) {
-            get(i, before.data());
+            std::memcpy(before.data(), read(i), bytes_);
             convert(before.data(), after.data());
-            std::memcpy(pages_.page(i / perPage, true) + i % perPage * bytes, after.data(), bytes);
+            uint8_t* const to = pages_ ? pages_->page(i / perPage, true) + i % perPage * bytes : first_ + i * bytes;
+            std::memcpy(to, after.data(), bytes);
         }
         bytes_ = bytes;
         perPage_ = perPage;
-        pages_.truncate((count + perPage - 1) / perPage);
+        forget(count);
     }
-    Result<void> status() const { return pages_.status(); }
-    uint64_t fileBytes() const { return pages_.fileBytes(); }
+    Result<void> status() const { return pages_ ? pages_->status() : Result<void>(); }
+    uint64_t fileBytes() const { return pages_ ? pages_->fileBytes() : 0; }
 
   private:
-    PageCache pages_;
+    uint8_t* at(uint64_t i, bool isWritten) {
+        return pages_ ? pages_->page(i / perPage_, isWritten) + i % perPage_ * bytes_ : first_ + i * bytes_;
+    }
+    /// All but the first `count`.
+    void forget(uint64_t count);
+
+    std::unique_ptr<HugeRegion> whole_;  ///< by parts of a huge page
+    uint8_t* first_ = nullptr;           ///< of it
+    std::optional<PageCache> pages_;     ///< or in these
     size_t bytes_;
-    uint64_t perPage_;
+    uint64_t perPage_, parts_ = 0;
 };
 
 }  // namespace stipple

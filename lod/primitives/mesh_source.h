@@ -58,6 +58,7 @@ class BlockMaker {
     MeshSource::Take take_;
     TriangleMesh block_;
     std::vector<uint64_t> table_;  ///< open addressing: vertex + 1 << 24 | its number in the block
+    std::vector<uint32_t> used_;   ///< places of the table
 };
 
 /// `block` after `to`, with its indices moved. Both have the same arrays.

@@ -133,5 +133,34 @@ TEST(Executor, RunsEverythingOnceWhateverTheThreads) {
     }
 }
 
+TEST(Executor, ATaskBesideItsCallerIsDoneAfterWaiting) {
+    for (const int threads : {1, 2, 5}) {
+        const auto executor = makeTbbExecutor(threads);
+        std::atomic<int> sum{0};
+        const auto add = [&] {
+            executor->parallelFor(1000, 1, [&](size_t begin, size_t end) { sum += static_cast<int>(end - begin); });
+        };
+        for (int k = 1; k <= 50; ++k) {
+            const auto beside = executor->beside(add);
+            executor->parallelFor(100, 1, [&](size_t begin, size_t end) { sum += static_cast<int>(end - begin); });
+            beside->wait();
+            ASSERT_EQ(sum, 1100 * k);
+        }
+        executor->beside(add).reset();  // waits, too
+        EXPECT_EQ(sum, 56'000);
+        // Of a task that is itself started: it waits for its own alone.
+        executor->run([&] { executor->beside(add)->wait(); });
+        executor->wait();
+        EXPECT_EQ(sum, 57'000);
+    }
+}
+
+TEST(Executor, ATaskBesideItsCallerThrowsWhereItIsWaitedFor) {
+    const auto executor = makeTbbExecutor(2);
+    const auto beside = executor->beside([] { throw std::bad_alloc(); });
+    EXPECT_THROW(beside->wait(), std::bad_alloc);
+    executor->beside([] { throw std::bad_alloc(); }).reset();  // nobody wants to know
+}
+
 }  // namespace
 }  // namespace stipple

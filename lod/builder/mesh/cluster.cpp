@@ -1,12 +1,11 @@
-// Clusters by meshoptimizer, groups of clusters by METIS.
+// Clusters by meshoptimizer, and groups of clusters that share long borders.
 #include <meshoptimizer.h>
-#include <metis.h>
 
 #include <algorithm>
 
 #include "engine/base/check.h"
-#include "engine/base/one_at_a_time.h"
 #include "lod/builder/mesh/mesh_work.h"
+#include "lod/builder/mesh/partition.h"
 
 namespace stipple::lod {
 namespace {
@@ -172,32 +171,26 @@ std::vector<uint64_t> sharedEdges(const std::vector<BorderEdge>& edges) {
     return links;
 }
 
-/// What METIS takes: the neighbours of each cluster one after the other.
-struct Graph {
-    std::vector<idx_t> start{0}, neighbour, weight;
-};
-
-Graph graphOf(std::vector<uint64_t> links, uint32_t count) {
-    Graph graph;
+ClusterGraph graphOf(std::vector<uint64_t> links, uint32_t count) {
+    ClusterGraph graph;
     // Clusters that touch nothing belong to those beside them on the curve.
-    constexpr idx_t kShared = 16;
+    constexpr int32_t kShared = 16;
     for (uint32_t c = 0; c + 1 < count; ++c) {
         links.push_back(uint64_t{c} << 32 | (c + 1));
         links.push_back(uint64_t{c + 1} << 32 | c);
     }
     std::sort(links.begin(), links.end());
-    uint32_t from = 0;
     for (size_t i = 0; i < links.size();) {
         size_t j = i;
         while (j < links.size() && links[j] == links[i]) ++j;
         const auto a = static_cast<uint32_t>(links[i] >> 32), b = static_cast<uint32_t>(links[i]);
-        for (; from < a; ++from) graph.start.push_back(static_cast<idx_t>(graph.neighbour.size()));
-        graph.neighbour.push_back(static_cast<idx_t>(b));
+        while (graph.count() < a) graph.start.push_back(static_cast<uint32_t>(graph.neighbour.size()));
+        graph.neighbour.push_back(b);
         const bool isBeside = a + 1 == b || b + 1 == a;
-        graph.weight.push_back(kShared * static_cast<idx_t>(j - i - (isBeside ? 1 : 0)) + 1);
+        graph.weight.push_back(kShared * static_cast<int32_t>(j - i - (isBeside ? 1 : 0)) + 1);
         i = j;
     }
-    for (; from < count; ++from) graph.start.push_back(static_cast<idx_t>(graph.neighbour.size()));
+    while (graph.count() < count) graph.start.push_back(static_cast<uint32_t>(graph.neighbour.size()));
     return graph;
 }
 
@@ -212,32 +205,12 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
         for (uint32_t i = 0; i < count; ++i) groups[0].push_back(i);
         return groups;
     }
-    Graph graph = graphOf(sharedEdges(borderEdges(mesh, clusters, executor)), count);
-    idx_t vertices = static_cast<idx_t>(count), constraints = 1, parts = static_cast<idx_t>((count + size - 1) / size),
-          cut = 0;
-    std::array<idx_t, METIS_NOPTIONS> options{};
-    METIS_SetDefaultOptions(options.data());
-    options[METIS_OPTION_SEED] = 1;
-    options[METIS_OPTION_UFACTOR] = 200;
-    std::vector<idx_t> part(count);
-    static OneAtATime partitioner;  // its random numbers are the process's: two at once would share one sequence
-    const int status = partitioner([&] {
-        return METIS_PartGraphKway(&vertices, &constraints, graph.start.data(), graph.neighbour.data(), nullptr,
-                                   nullptr, graph.weight.data(), &parts, nullptr, nullptr, options.data(), &cut,
-                                   part.data());
-    });
-    STIPPLE_CHECK(status == METIS_OK, "METIS");
-    groups.resize(static_cast<size_t>(parts));
-    for (uint32_t c = 0; c < count; ++c) groups[static_cast<size_t>(part[c])].push_back(c);
-    std::erase_if(groups, [](const auto& g) { return g.empty(); });
-    // METIS may make a part too large for one chunk's bookkeeping to stay small.
-    std::vector<std::vector<uint32_t>> even;
-    for (auto& g : groups)
-        for (size_t i = 0; i < g.size(); i += size_t{2} * size)
-            even.emplace_back(g.begin() + static_cast<ptrdiff_t>(i),
-                              g.begin() + static_cast<ptrdiff_t>(std::min(g.size(), i + size_t{2} * size)));
-    std::sort(even.begin(), even.end());
-    return even;
+    const std::vector<uint32_t> part =
+        partition(graphOf(sharedEdges(borderEdges(mesh, clusters, executor)), count), size);
+    groups.resize((count + size - 1) / size);
+    for (uint32_t c = 0; c < count; ++c) groups[part[c]].push_back(c);
+    std::sort(groups.begin(), groups.end());
+    return groups;
 }
 
 namespace {

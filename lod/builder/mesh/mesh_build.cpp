@@ -114,9 +114,8 @@ class MeshBuild : public CellContent {
     Result<void> places(const Places& take) override {
         facts_.triangles = 0;
         size_t number = 0;
-        STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
-            facts_.triangles += block.indices.size() / 3;
-            PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+        STIPPLE_TRY(forBlocks(Placed::positions, [&](PlacedBlock& placed) -> Result<void> {
+            facts_.triangles += placed.given;
             if (!parts_.place(placed, number++)) return changed();
             return take(placed.centres(), source_.triangles);
         }));
@@ -157,11 +156,10 @@ class MeshBuild : public CellContent {
                 if (!buffers[a].indices.empty()) STIPPLE_TRY(flush(a));
             return {};
         };
-        STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
-            const uint64_t triangles = block.indices.size() / 3;
+        STIPPLE_TRY(forBlocks(Placed::all, [&](PlacedBlock& placed) -> Result<void> {
+            const uint64_t triangles = placed.given;
             const size_t here = number++;
             if (to.begins()) return to.ends(triangles, facts_.triangles, flushAll);
-            PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
             if (!parts_.place(placed, here)) return changed();
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
@@ -331,8 +329,8 @@ class MeshBuild : public CellContent {
         bool isKnown = mayHaveParts();
         parts_ = PartFinder(facts_.lattice);
         if (isKnown) {
-            const Result<void> read = source_.read([&](const TriangleMesh& block) -> Result<void> {
-                isKnown = parts_.add(placeBlock(block, facts_.lattice, executor_));
+            const Result<void> read = forBlocks(Placed::positions, [&](PlacedBlock& placed) -> Result<void> {
+                isKnown = parts_.add(placed);
                 if (!isKnown) return fail(ErrorKind::budget, "too many triangles to look for parts", source());
                 return {};
             });
@@ -340,6 +338,10 @@ class MeshBuild : public CellContent {
         }
         parts_.finish(isKnown);
         return {};
+    }
+
+    Result<void> forBlocks(Placed what, const std::function<Result<void>(PlacedBlock& block)>& use) const {
+        return forPlacedBlocks(source_, facts_.lattice, executor_, what, use);
     }
 
     static Frame frameOf(const Lattice& lattice) {

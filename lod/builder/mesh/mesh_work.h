@@ -88,9 +88,16 @@ struct PlacedBlock {
     std::vector<uint64_t> high;                          ///< see Coordinates; empty: none
     uint64_t degenerate = 0, notFinite = 0, tooFar = 0;  ///< tooFar: beyond the lattice's reach
     double rounding = 0;                                 ///< largest of a coordinate, world units
+    uint64_t given = 0;                                  ///< triangles, of which these are left
     Coordinates centres() const { return {x, y, z, high}; }
 };
-PlacedBlock placeBlock(const TriangleMesh& block, const Lattice& lattice, Executor& executor);
+/// `positions`: what else vertices have is left out.
+enum class Placed { all, positions };
+PlacedBlock placeBlock(const TriangleMesh& block, const Lattice& lattice, Executor& executor,
+                       Placed what = Placed::all);
+/// Of all blocks of a source, in their order, on the calling thread. While one is used or read, the next is placed.
+Result<void> forPlacedBlocks(const MeshSource& source, const Lattice& lattice, Executor& executor, Placed what,
+                             const std::function<Result<void>(PlacedBlock& block)>& use);
 
 /// Vertices of one cell, each once; triangles of every level of detail index the same ones.
 struct WeldedMesh {

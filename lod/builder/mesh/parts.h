@@ -64,7 +64,8 @@ uint32_t partsOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vect
 void appendWholeClusters(const LocalMesh& local, const std::vector<std::vector<uint32_t>>& parts,
                          std::vector<Cluster>& out);
 
-/// Groups of about `size` clusters each, no part in two: of those with isWhole in their order, of the others by METIS.
+/// Groups of about `size` clusters each, no part in two: of those with isWhole in their order, of the others by the borders
+/// they share.
 std::vector<std::vector<uint32_t>> groupAll(const WeldedMesh& mesh, const std::vector<Cluster>& clusters, uint32_t size,
                                             Executor& executor);
 

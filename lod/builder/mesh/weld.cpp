@@ -3,6 +3,8 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <optional>
 #include <tuple>
 
 #include "engine/base/numbers.h"
@@ -69,8 +71,9 @@ glm::u64vec3 keyPlace(const Steps& at, const Lattice& lattice) {
     return lattice.isWide() ? glm::u64vec3(inLogarithms(at) - lattice.firstKey) : glm::u64vec3(at);
 }
 
-PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor& executor) {
+PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor& executor, Placed what) {
     PlacedBlock out;
+    out.given = in.indices.size() / 3;
     auto& vertices = out.soup.vertices.low;
     auto& high = out.soup.vertices.high;
     vertices.resize(in.position.size());
@@ -89,6 +92,7 @@ PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor&
         if (!high.empty()) high[i] = glm::ivec3(at >> int64_t{32});
         const glm::dvec3 off = glm::abs(lattice.origin + q * lattice.unit - p);
         rounding = std::max({rounding, off.x, off.y, off.z});
+        if (what == Placed::positions) return;
         const glm::vec3 n = in.normal.empty() ? glm::vec3(0) : in.normal[i];
         const bool isFlat = !hasDirection(n);
         v.normal = isFlat ? octEncode({0, 0, 1}) : octEncode(n);
@@ -127,6 +131,28 @@ PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor&
         if (lattice.isWide()) out.high.push_back(highOf({middle.x, middle.y, middle.z}));
     }
     return out;
+}
+
+Result<void> forPlacedBlocks(const MeshSource& source, const Lattice& lattice, Executor& executor, Placed what,
+                             const std::function<Result<void>(PlacedBlock& block)>& use) {
+    TriangleMesh block;
+    PlacedBlock next;
+    std::unique_ptr<Executor::Beside> placing;  // ends before what it writes to
+    const auto taken = [&] {
+        placing->wait();
+        placing.reset();
+        return std::move(next);
+    };
+    STIPPLE_TRY(source.read([&](const TriangleMesh& read) -> Result<void> {
+        std::optional<PlacedBlock> before;
+        if (placing != nullptr) before = taken();
+        block = read;  // the source goes on with its own
+        placing = executor.beside([&] { next = placeBlock(block, lattice, executor, what); });
+        return before ? use(*before) : Result<void>();
+    }));
+    if (placing == nullptr) return {};
+    PlacedBlock last = taken();
+    return use(last);
 }
 
 WeldedMesh weld(Soup& soup) {

@@ -58,7 +58,7 @@ struct Vertex {
 /// Vertices, no wider than what the file says of them.
 class VertexStore {
   public:
-    VertexStore(const PlyElement& vertex, uint64_t memoryBytes, const std::string& folder) {
+    VertexStore(const PlyElement& vertex, uint64_t memoryBytes, const std::string& folder) : count_(vertex.count) {
         std::array<bool, kPlyRoles> has{};
         for (const PlyProperty& p : vertex.properties) {
             if (p.role == PlyRole::none) continue;
@@ -74,15 +74,15 @@ class VertexStore {
     /// Empty again.
     void begin() {
         isSumming_ = !hasNormals_;
-        values_.emplace(folder_, memoryBytes_, bytes());
+        values_.emplace(folder_, memoryBytes_, bytes(), count_);
     }
     bool hasNormals() const { return hasNormals_; }
-    size_t bytes() const { return (isWide_ ? 24u : 12u) + (isSumming_ ? 12u : 4u) + (hasColours_ ? 4u : 0u); }
+    size_t bytes() const { return placeBytes() + (isSumming_ ? 12u : 4u) + (hasColours_ ? 4u : 0u); }
     /// Normals are complete: their lengths do not matter any more.
-    void endSums(uint64_t count) {
+    void endSums() {
         isSumming_ = false;
-        const size_t place = isWide_ ? 24 : 12, colour = hasColours_ ? 4 : 0;
-        values_->narrow(count, bytes(), [&](const uint8_t* from, uint8_t* to) {
+        const size_t place = placeBytes(), colour = hasColours_ ? 4 : 0;
+        values_->narrow(count_, bytes(), [&](const uint8_t* from, uint8_t* to) {
             glm::vec3 sum(0);
             std::memcpy(&sum, from + place, sizeof(sum));
             const uint32_t code = codeOf(sum);
@@ -94,8 +94,7 @@ class VertexStore {
     Result<void> status() const { return values_->status(); }
 
     void set(uint64_t i, const Vertex& v) {
-        std::array<uint8_t, 40> record{};
-        uint8_t* to = record.data();
+        uint8_t* to = values_->write(i);
         const auto put = [&](const auto& value) {
             std::memcpy(to, &value, sizeof(value));
             to += sizeof(value);
@@ -109,19 +108,26 @@ class VertexStore {
         else
             put(codeOf(v.normal));
         if (hasColours_) put(v.colour);
-        values_->set(i, record.data());
+    }
+    glm::dvec3 position(uint64_t i) { return positionOf(values_->read(i)); }
+    /// Before endSums().
+    void addNormal(uint64_t i, const glm::vec3& normal) {
+        uint8_t* const at = values_->write(i) + placeBytes();
+        glm::vec3 sum;
+        std::memcpy(&sum, at, sizeof(sum));
+        sum += normal;
+        std::memcpy(at, &sum, sizeof(sum));
     }
     Vertex get(uint64_t i) {
-        std::array<uint8_t, 40> record{};
-        values_->get(i, record.data());
-        const uint8_t* from = record.data();
+        const uint8_t* from = values_->read(i);
         const auto take = [&](auto value) {
             std::memcpy(&value, from, sizeof(value));
             from += sizeof(value);
             return value;
         };
         Vertex v;
-        v.position = isWide_ ? take(glm::dvec3(0)) : glm::dvec3(take(glm::vec3(0)));
+        v.position = positionOf(from);
+        from += placeBytes();
         if (!isSumming_) {
             const uint32_t code = take(0u);
             if (code != ~0u) v.normal = shared::octDecode(code);
@@ -133,9 +139,19 @@ class VertexStore {
     }
 
   private:
+    size_t placeBytes() const { return isWide_ ? sizeof(glm::dvec3) : sizeof(glm::vec3); }
+    glm::dvec3 positionOf(const uint8_t* from) const {
+        glm::dvec3 wide(0);
+        glm::vec3 narrow(0);
+        if (isWide_)
+            std::memcpy(&wide, from, sizeof(wide));
+        else
+            std::memcpy(&narrow, from, sizeof(narrow));
+        return isWide_ ? wide : glm::dvec3(narrow);
+    }
     static uint32_t codeOf(const glm::vec3& normal) { return hasDirection(normal) ? octEncode(normal) : ~0u; }
     bool isWide_ = false, hasNormals_ = false, hasColours_ = false, isSumming_ = false;
-    uint64_t memoryBytes_ = 0;
+    uint64_t memoryBytes_ = 0, count_ = 0;
     std::string folder_;
     std::optional<PagedArray> values_;
 };
@@ -177,7 +193,7 @@ class PlyMesh {
         facesAt_ = reader.offset();
         if (!vertices_.hasNormals()) {
             STIPPLE_TRY(sumNormals(bounds, [&](uint64_t done) { return tell(count_ + done, all); }));
-            vertices_.endSums(count_);
+            vertices_.endSums();
         }
         STIPPLE_TRY(vertices_.status());
         return bounds;
@@ -224,22 +240,17 @@ class PlyMesh {
         int exponent = 0;
         (void)std::frexp(std::max({size.x, size.y, size.z}), &exponent);
         const double scale = std::ldexp(1.0, -std::clamp(exponent, -1000, 1000));
-        const auto edge = [&](const Vertex& from, const Vertex& to) { return scale * (to.position - from.position); };
         return forTriangles([&](double a, double b, double c) -> Result<void> {
             if (++done % kOften == 0) STIPPLE_TRY(tell(done));
             const auto n = static_cast<double>(count_);
             if (!(a >= 0 && a < n && b >= 0 && b < n && c >= 0 && c < n)) return {};
             const std::array<uint64_t, 3> corner{static_cast<uint64_t>(a), static_cast<uint64_t>(b),
                                                  static_cast<uint64_t>(c)};
-            std::array<Vertex, 3> v{vertices_.get(corner[0]), vertices_.get(corner[1]), vertices_.get(corner[2])};
-            const glm::vec3 sum(glm::cross(edge(v[0], v[1]), edge(v[0], v[2])));
+            const glm::dvec3 first = vertices_.position(corner[0]);
+            const glm::vec3 sum(glm::cross(scale * (vertices_.position(corner[1]) - first),
+                                           scale * (vertices_.position(corner[2]) - first)));
             if (!isFinite(sum)) return {};
-            const bool isOneTwice = corner[0] == corner[1] || corner[1] == corner[2] || corner[2] == corner[0];
-            for (size_t k = 0; k < 3; ++k) {
-                if (isOneTwice) v.at(k) = vertices_.get(corner.at(k));
-                v.at(k).normal += sum;
-                vertices_.set(corner.at(k), v.at(k));
-            }
+            for (const uint64_t i : corner) vertices_.addNormal(i, sum);
             return {};
         });
     }
