@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <system_error>
 #include <thread>
@@ -18,6 +19,33 @@
 
 namespace stipple {
 namespace {
+
+/// What a task threw, until somebody asks.
+class Caught {
+  public:
+    void run(const std::function<void()>& task) noexcept {
+        try {
+            task();
+        } catch (...) {
+            thrown_ = std::current_exception();
+        }
+    }
+    void rethrow() {
+        if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+    }
+
+  private:
+    std::exception_ptr thrown_;
+};
+
+class DoneAlready final : public Executor::Beside {
+  public:
+    explicit DoneAlready(const std::function<void()>& task) { caught_.run(task); }
+    void wait() override { caught_.rethrow(); }
+
+  private:
+    Caught caught_;
+};
 
 #ifdef __SANITIZE_THREAD__
 // ThreadSanitizer knows nothing of the synchronisation inside the (uninstrumented) TBB library and would report every
@@ -39,6 +67,25 @@ class ThreadExecutor final : public Executor {
         for (std::thread& helper : helpers) helper.join();
     }
     void run(std::function<void()> task) override { tasks_.emplace_back(std::move(task)); }
+    std::unique_ptr<Beside> beside(const std::function<void()>& task) override {
+        class Thread final : public Beside {
+          public:
+            explicit Thread(const std::function<void()>& task) : thread_([this, task] { caught_.run(task); }) {}
+            ~Thread() override {
+                if (thread_.joinable()) thread_.join();
+            }
+            void wait() override {
+                thread_.join();
+                caught_.rethrow();
+            }
+
+          private:
+            Caught caught_;
+            std::thread thread_;
+        };
+        if (threads_ == 1) return Executor::beside(task);
+        return std::make_unique<Thread>(task);
+    }
     void wait() override {
         for (std::thread& task : std::exchange(tasks_, {})) task.join();
     }
@@ -147,11 +194,6 @@ void allowThreads(size_t threads) {
     control = new tbb::global_control(kMost, threads);
 }
 
-class DoneAlready final : public Executor::Beside {
-  public:
-    void wait() override {}
-};
-
 class TbbBeside final : public Executor::Beside {
   public:
     TbbBeside(tbb::task_arena& arena, const std::function<void()>& task) : arena_(arena) {
@@ -237,8 +279,7 @@ class SerialExecutor final : public Executor {
 void isolated(const std::function<void()>& work) { tbb::this_task_arena::isolate(work); }
 
 std::unique_ptr<Executor::Beside> Executor::beside(const std::function<void()>& task) {
-    task();
-    return std::make_unique<DoneAlready>();
+    return std::make_unique<DoneAlready>(task);
 }
 
 std::unique_ptr<Executor> makeTbbExecutor(int threads) {

@@ -21,7 +21,7 @@ class Executor {
     class Beside {
       public:
         virtual ~Beside() = default;  ///< waits, too
-        /// Once: helps until the task is done, and throws what it threw.
+        /// Once; throws what the task threw. Helps with it or with any other task: hold no lock that one may want.
         virtual void wait() = 0;
     };
     /// Starts `task`. With one thread it is done before this returns.

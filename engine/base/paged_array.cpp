@@ -80,9 +80,16 @@ PagedArray::PagedArray(const std::string& folder, uint64_t memoryBytes, size_t b
         pages_.emplace(folder, memoryBytes);
         return;
     }
+    if (count * bytes < kHugePage) {
+        few_.resize(count * bytes);
+        first_ = few_.data();
+        return;
+    }
     parts_ = (count * bytes + kHugePage - 1) / kHugePage;
-    whole_ = std::make_unique<HugeRegion>(std::vector<uint64_t>(parts_, kHugePage));
-    if (parts_ > 0) first_ = whole_->part(0).data();
+    std::vector<uint64_t> sizes(parts_, kHugePage);
+    sizes.back() = count * bytes - (parts_ - 1) * kHugePage;
+    whole_ = std::make_unique<HugeRegion>(sizes);
+    first_ = whole_->part(0).data();
 }
 
 void PagedArray::forget(uint64_t count) {
@@ -90,7 +97,7 @@ void PagedArray::forget(uint64_t count) {
         pages_->truncate((count + perPage_ - 1) / perPage_);
         return;
     }
-    const uint64_t kept = (count * bytes_ + kHugePage - 1) / kHugePage;
+    const uint64_t kept = std::max<uint64_t>((count * bytes_ + kHugePage - 1) / kHugePage, 1);
     for (; parts_ > kept; --parts_) whole_->release(parts_ - 1);
 }
 

@@ -87,8 +87,9 @@ class PagedArray {
     /// All but the first `count`.
     void forget(uint64_t count);
 
-    std::unique_ptr<HugeRegion> whole_;  ///< by parts of a huge page
-    uint8_t* first_ = nullptr;           ///< of it
+    std::vector<uint8_t> few_;           ///< less than a huge page of them
+    std::unique_ptr<HugeRegion> whole_;  ///< more, by parts of a huge page
+    uint8_t* first_ = nullptr;           ///< of either
     std::optional<PageCache> pages_;     ///< or in these
     size_t bytes_;
     uint64_t perPage_, parts_ = 0;

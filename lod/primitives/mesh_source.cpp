@@ -51,9 +51,12 @@ void MeshSource::Bounds::keep(const glm::dvec3& p) {
 Result<void> BlockMaker::triangle(uint64_t a, uint64_t b, uint64_t c) {
     if (table_.empty()) table_.assign(kSlots, 0);
     for (const uint64_t vertex : {a, b, c}) {
-        // Those of a line of memory stay together: vertices that are used together mostly have numbers side by side.
+        // Vertices that are used together mostly have numbers side by side: eight of them share a line of memory. The
+        // places of the eights are mixed twice, so that no stride of numbers, as of instances, puts them side by side.
         constexpr uint64_t kTogether = 8;
-        size_t at = ((vertex / kTogether * 0x9e3779b97f4a7c15ull >> 48) * kTogether + vertex % kTogether);
+        uint64_t mixed = vertex / kTogether * 0xbf58476d1ce4e5b9ull;
+        mixed = (mixed ^ mixed >> 32) * 0x94d049bb133111ebull;
+        size_t at = (mixed >> 48) * kTogether + vertex % kTogether;
         static_assert(kSlots == (size_t{1} << 16) * kTogether);
         while (table_[at] != 0 && table_[at] >> 24 != vertex + 1) at = (at + 1) % kSlots;
         if (table_[at] == 0) {

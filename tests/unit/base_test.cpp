@@ -148,7 +148,7 @@ TEST(Executor, ATaskBesideItsCallerIsDoneAfterWaiting) {
         }
         executor->beside(add).reset();  // waits, too
         EXPECT_EQ(sum, 56'000);
-        // Of a task that is itself started: it waits for its own alone.
+        // Of a task that is itself started.
         executor->run([&] { executor->beside(add)->wait(); });
         executor->wait();
         EXPECT_EQ(sum, 57'000);
@@ -156,10 +156,12 @@ TEST(Executor, ATaskBesideItsCallerIsDoneAfterWaiting) {
 }
 
 TEST(Executor, ATaskBesideItsCallerThrowsWhereItIsWaitedFor) {
-    const auto executor = makeTbbExecutor(2);
-    const auto beside = executor->beside([] { throw std::bad_alloc(); });
-    EXPECT_THROW(beside->wait(), std::bad_alloc);
-    executor->beside([] { throw std::bad_alloc(); }).reset();  // nobody wants to know
+    for (const int threads : {1, 2}) {
+        const auto executor = makeTbbExecutor(threads);
+        const auto beside = executor->beside([] { throw std::bad_alloc(); });
+        EXPECT_THROW(beside->wait(), std::bad_alloc);
+        executor->beside([] { throw std::bad_alloc(); }).reset();  // nobody wants to know
+    }
 }
 
 }  // namespace

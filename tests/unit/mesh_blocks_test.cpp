@@ -1,6 +1,9 @@
 // Triangles that are read block by block: each block has vertices of its own, and one is placed while others are used.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
+#include <cmath>
 #include <set>
 #include <thread>
 
@@ -78,7 +81,7 @@ class PlacedBlocks : public testing::TestWithParam<int> {
 
 TEST_P(PlacedBlocks, ComeInOrderOnTheCallingThread) {
     ASSERT_TRUE(
-        forPlacedBlocks(counted(300, calls_), {}, *executor_, Placed::all, [&](PlacedBlock& b) { return use(b); }));
+        forPlacedBlocks(counted(300, calls_), {}, *executor_, Placed::all, 0, [&](PlacedBlock& b) { return use(b); }));
     ASSERT_EQ(used_.size(), 300u);
     for (int b = 0; b < 300; ++b) EXPECT_EQ(used_[static_cast<size_t>(b)], b);
     EXPECT_EQ(calls_, std::set{std::this_thread::get_id()}) << "hosts give sources";
@@ -86,18 +89,19 @@ TEST_P(PlacedBlocks, ComeInOrderOnTheCallingThread) {
 
 TEST_P(PlacedBlocks, OfNothingAreNone) {
     ASSERT_TRUE(
-        forPlacedBlocks(counted(0, calls_), {}, *executor_, Placed::all, [&](PlacedBlock& b) { return use(b); }));
+        forPlacedBlocks(counted(0, calls_), {}, *executor_, Placed::all, 0, [&](PlacedBlock& b) { return use(b); }));
     EXPECT_TRUE(used_.empty());
 }
 
 TEST_P(PlacedBlocks, EndWithTheFirstErrorOfEitherSide) {
     const auto read =
-        forPlacedBlocks(counted(9, calls_, 5), {}, *executor_, Placed::all, [&](PlacedBlock& b) { return use(b); });
+        forPlacedBlocks(counted(9, calls_, 5), {}, *executor_, Placed::all, 0, [&](PlacedBlock& b) { return use(b); });
     ASSERT_FALSE(read);
     EXPECT_EQ(read.error().what, "gone");
+    EXPECT_EQ(used_, GetParam() == 1 ? (std::vector<int>{0, 1, 2, 3, 4}) : (std::vector<int>{0, 1, 2, 3}));
     used_.clear();
     const auto taken =
-        forPlacedBlocks(counted(9, calls_), {}, *executor_, Placed::all, [&](PlacedBlock& b) -> Result<void> {
+        forPlacedBlocks(counted(9, calls_), {}, *executor_, Placed::all, 0, [&](PlacedBlock& b) -> Result<void> {
             if (used_.size() == 3) return fail(ErrorKind::budget, "full", "a disk");
             return use(b);
         });
@@ -106,14 +110,123 @@ TEST_P(PlacedBlocks, EndWithTheFirstErrorOfEitherSide) {
     EXPECT_EQ(used_, (std::vector<int>{0, 1, 2}));
 }
 
-TEST_P(PlacedBlocks, OfWhichOnlyThePlacesAreWanted) {
-    std::vector<std::array<uint32_t, 3>> centres, expected;
-    for (const Placed what : {Placed::all, Placed::positions})
-        ASSERT_TRUE(forPlacedBlocks(counted(5, calls_), {}, *executor_, what, [&](PlacedBlock& b) -> Result<void> {
-            (what == Placed::all ? expected : centres).push_back({b.x[0], b.y[0], b.z[0]});
+/// Counting and parts look at positions alone: they have to leave out the same triangles as what is sent.
+TEST_P(PlacedBlocks, OfPositionsAloneAreTheSamePlaces) {
+    TriangleMesh mesh;
+    Rng rng(29);
+    for (uint32_t i = 0; i < 3000; ++i) {
+        const double far = i % 500 == 7 ? 1e12 : 1;
+        mesh.position.emplace_back(far * rng.uniform(), rng.uniform(), i == 4 ? NAN : rng.uniform());
+        mesh.normal.emplace_back(0, 1, 0);
+        mesh.uv.emplace_back(0.25, 0.75);
+        mesh.colour.push_back(0xff102030u);
+        mesh.surface.push_back(0x40u);
+        mesh.indices.push_back(i % 300 == 9 ? i - 1 : i);
+    }
+    const MeshSource source = sourceOf(std::move(mesh));
+    for (const bool isWide : {false, true}) {
+        const auto bounds = source.survey({});
+        ASSERT_TRUE(bounds);
+        Lattice lattice = latticeOf(*bounds);
+        EXPECT_TRUE(lattice.isWide());
+        if (!isWide) lattice = {};
+        const auto placed = [&](Placed what) {
+            PlacedBlock out;
+            EXPECT_TRUE(forPlacedBlocks(source, lattice, *executor_, what, 0, [&](PlacedBlock& b) -> Result<void> {
+                out = std::move(b);
+                return {};
+            }));
+            return out;
+        };
+        const PlacedBlock all = placed(Placed::all), only = placed(Placed::positions);
+        EXPECT_EQ(only.x, all.x);
+        EXPECT_EQ(only.y, all.y);
+        EXPECT_EQ(only.z, all.z);
+        EXPECT_EQ(only.high, all.high);
+        EXPECT_EQ(only.soup.indices, all.soup.indices);
+        EXPECT_EQ(only.rounding, all.rounding);
+        EXPECT_EQ(only.degenerate, all.degenerate);
+        EXPECT_EQ(only.notFinite, all.notFinite);
+        EXPECT_EQ(only.notFinite, 1u);
+        ASSERT_EQ(only.soup.vertices.size(), all.soup.vertices.size());
+        for (uint32_t v = 0; v < all.soup.vertices.size(); ++v) {
+            EXPECT_EQ(only.soup.vertices.at(v), all.soup.vertices.at(v));
+            EXPECT_EQ(all.soup.vertices.low[v].surface & 0x40u, 0x40u);
+            EXPECT_EQ(only.soup.vertices.low[v].colour, 0u) << "nobody looks at it";
+        }
+    }
+}
+
+TEST_P(PlacedBlocks, OfWhichTheFirstWereSentAlready) {
+    size_t number = 0;
+    ASSERT_TRUE(
+        forPlacedBlocks(counted(9, calls_), {}, *executor_, Placed::all, 4, [&](PlacedBlock& b) -> Result<void> {
+            EXPECT_EQ(b.given, 2u);
+            EXPECT_EQ(b.soup.vertices.size(), number < 4 ? 0u : 4u);
+            if (number >= 4) EXPECT_EQ(b.soup.vertices.low[0].x, static_cast<int>(number));
+            ++number;
             return {};
         }));
-    EXPECT_EQ(centres, expected);
+    EXPECT_EQ(number, 9u);
+}
+
+/// Whose tasks beside the caller have no memory, or wait until the caller is somewhere.
+class OtherExecutor final : public Executor {
+  public:
+    void parallelFor(size_t count, size_t, const std::function<void(size_t, size_t)>& body) override {
+        if (std::this_thread::get_id() != caller_ && before_) before_();
+        body(0, count);
+    }
+    void run(std::function<void()> task) override { task(); }
+    void wait() override {}
+    int threads() const override { return 2; }
+    std::unique_ptr<Beside> beside(const std::function<void()>& task) override { return tasks_->beside(task); }
+    std::function<void()> before_;
+
+  private:
+    std::unique_ptr<Executor> tasks_ = makeTbbExecutor(2);
+    std::thread::id caller_ = std::this_thread::get_id();
+};
+
+TEST(PlacedBlocksBeside, WhatFailsThereIsToldHere) {
+    OtherExecutor executor;
+    int beside = 0;
+    std::atomic<bool> isOver{false};
+    executor.before_ = [&] { throw std::bad_alloc(); };
+    std::set<std::thread::id> calls;
+    for (int k = 0; k < 20 && beside == 0; ++k) try {
+            (void)forPlacedBlocks(counted(50, calls), {}, executor, Placed::all, 0, [&](PlacedBlock&) -> Result<void> {
+                std::this_thread::sleep_for(std::chrono::milliseconds(2));  // so that the other thread takes the next
+                return {};
+            });
+        } catch (const std::bad_alloc&) {
+            ++beside;
+        }
+    EXPECT_EQ(beside, 1);
+    // A caller that throws while another block is placed: that one is waited for.
+    executor.before_ = [&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        isOver = true;
+    };
+    EXPECT_THROW((void)forPlacedBlocks(counted(50, calls), {}, executor, Placed::all, 0,
+                                       [&](PlacedBlock&) -> Result<void> { throw std::bad_alloc(); }),
+                 std::bad_alloc);
+}
+
+TEST(PlacedBlocksBeside, OneIsPlacedWhileAnotherIsUsed) {
+    OtherExecutor executor;
+    std::atomic<int> placed{0};
+    executor.before_ = [&] { ++placed; };
+    std::set<std::thread::id> calls;
+    bool wasPlacedMeanwhile = false;
+    ASSERT_TRUE(forPlacedBlocks(counted(20, calls), {}, executor, Placed::all, 0, [&](PlacedBlock&) -> Result<void> {
+        const int before = placed;
+        for (int k = 0; k < 1000 && placed == before && !wasPlacedMeanwhile; ++k)
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        wasPlacedMeanwhile = wasPlacedMeanwhile || placed > before;
+        return {};
+    }));
+    EXPECT_TRUE(wasPlacedMeanwhile);
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, PlacedBlocks, testing::Values(1, 2, 5));

@@ -57,7 +57,7 @@ int64_t between(const Links& links, const std::vector<uint32_t>& part) {
     return sum;
 }
 
-/// Every part that there should be is there, and none is too large or, of what is `connected`, too small.
+/// Every part that there should be is there, and none is empty, too large or too small.
 void expectSizes(const std::vector<uint32_t>& part, uint32_t count, uint32_t size = kSize) {
     ASSERT_EQ(part.size(), count);
     const uint32_t parts = (count + size - 1) / size;
@@ -67,7 +67,7 @@ void expectSizes(const std::vector<uint32_t>& part, uint32_t count, uint32_t siz
         ++sizes[p];
     }
     for (const uint32_t n : sizes) {
-        EXPECT_GE(n, std::min(count / parts, size * 5 / 8));
+        EXPECT_GE(n, std::max(1u, std::min(count / parts, size * 5 / 8)));
         EXPECT_LE(n, std::max((count + parts - 1) / parts, (size * 5 + 3) / 4));
     }
 }
@@ -117,6 +117,22 @@ TEST(Partition, WhatTouchesNothingAndWhatTouchesAll) {
         expectSizes(part, count);
         EXPECT_LE(between(chain, part), static_cast<int64_t>((count + kSize - 1) / kSize) - 1);  // each part in one
     }
+}
+
+/// Twelve clusters are two groups of six: only an exchange can change them.
+TEST(Partition, GroupsOfExactSizesAreExchanged) {
+    Links links;
+    const auto ofFirst = [](uint32_t v) { return v % 2 == 0; };
+    for (uint32_t a = 0; a < 12; ++a)
+        for (uint32_t b = a + 1; b < 12; ++b)
+            if (ofFirst(a) == ofFirst(b)) links[{a, b}] = 1 + static_cast<int32_t>((a * 7 + b * 3) % 4);
+    const std::vector<uint32_t> part = partition(graphOf(12, links), kSize);
+    EXPECT_EQ(between(links, part), 0);
+}
+
+TEST(Partition, PartsOfOne) {
+    const std::vector<uint32_t> part = partition(graphOf(16, {{{7, 8}, 1}}), 1);
+    expectSizes(part, 16, 1);
 }
 
 TEST(Partition, RandomGraphsOfAllSizes) {

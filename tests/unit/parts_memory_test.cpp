@@ -35,7 +35,7 @@ TriangleMesh separateTriangles(uint32_t count) {
 }
 
 TEST(PartFinder, TakesNoMoreMemoryThanItCounts) {
-    const auto executor = makeSerialExecutor();
+    const auto executor = makeTbbExecutor(2);  // a block is placed beside the one that is looked at
     for (const uint32_t triangles : {70'000u, 300'000u, 700'000u})
         for (const bool isWide : {false, true}) {
             TriangleMesh mesh = separateTriangles(triangles);
@@ -48,10 +48,11 @@ TEST(PartFinder, TakesNoMoreMemoryThanItCounts) {
             peak = live.load();
             const size_t before = live;
             PartFinder finder(lattice);
-            ASSERT_TRUE(source.read([&](const TriangleMesh& block) -> Result<void> {
-                EXPECT_TRUE(finder.add(placeBlock(block, lattice, *executor)));
-                return {};
-            }));
+            ASSERT_TRUE(forPlacedBlocks(source, lattice, *executor, Placed::all, 0,
+                                        [&](const PlacedBlock& block) -> Result<void> {
+                                            EXPECT_TRUE(finder.add(block));
+                                            return {};
+                                        }));
             finder.finish(true);
             const uint64_t counted = PartFinder::memory(triangles, uint64_t{3} * triangles);
             printf("[ measured ] %u triangles: %.1f MiB, counted %.1f\n", triangles,

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "engine/base/check.h"
 #include "lod/builder/mesh/mesh_work.h"
 #include "lod/builder/mesh/partition.h"
 

@@ -114,7 +114,7 @@ class MeshBuild : public CellContent {
     Result<void> places(const Places& take) override {
         facts_.triangles = 0;
         size_t number = 0;
-        STIPPLE_TRY(forBlocks(Placed::positions, [&](PlacedBlock& placed) -> Result<void> {
+        STIPPLE_TRY(forBlocks(Placed::positions, 0, [&](PlacedBlock& placed) -> Result<void> {
             facts_.triangles += placed.given;
             if (!parts_.place(placed, number++)) return changed();
             return take(placed.centres(), source_.triangles);
@@ -156,7 +156,7 @@ class MeshBuild : public CellContent {
                 if (!buffers[a].indices.empty()) STIPPLE_TRY(flush(a));
             return {};
         };
-        STIPPLE_TRY(forBlocks(Placed::all, [&](PlacedBlock& placed) -> Result<void> {
+        STIPPLE_TRY(forBlocks(Placed::all, to.blocksSent(), [&](PlacedBlock& placed) -> Result<void> {
             const uint64_t triangles = placed.given;
             const size_t here = number++;
             if (to.begins()) return to.ends(triangles, facts_.triangles, flushAll);
@@ -329,7 +329,7 @@ class MeshBuild : public CellContent {
         bool isKnown = mayHaveParts();
         parts_ = PartFinder(facts_.lattice);
         if (isKnown) {
-            const Result<void> read = forBlocks(Placed::positions, [&](PlacedBlock& placed) -> Result<void> {
+            const Result<void> read = forBlocks(Placed::positions, 0, [&](PlacedBlock& placed) -> Result<void> {
                 isKnown = parts_.add(placed);
                 if (!isKnown) return fail(ErrorKind::budget, "too many triangles to look for parts", source());
                 return {};
@@ -340,8 +340,9 @@ class MeshBuild : public CellContent {
         return {};
     }
 
-    Result<void> forBlocks(Placed what, const std::function<Result<void>(PlacedBlock& block)>& use) const {
-        return forPlacedBlocks(source_, facts_.lattice, executor_, what, use);
+    Result<void> forBlocks(Placed what, uint64_t unplaced,
+                           const std::function<Result<void>(PlacedBlock& block)>& use) const {
+        return forPlacedBlocks(source_, facts_.lattice, executor_, what, unplaced, use);
     }
 
     static Frame frameOf(const Lattice& lattice) {

@@ -95,9 +95,10 @@ struct PlacedBlock {
 enum class Placed { all, positions };
 PlacedBlock placeBlock(const TriangleMesh& block, const Lattice& lattice, Executor& executor,
                        Placed what = Placed::all);
-/// Of all blocks of a source, in their order, on the calling thread. While one is used or read, the next is placed.
+/// Of all blocks of a source, in their order, on the calling thread. While one is used or read, another is placed: what
+/// comes before an error of the source may not be used any more. Of the first `unplaced` only `given` is known.
 Result<void> forPlacedBlocks(const MeshSource& source, const Lattice& lattice, Executor& executor, Placed what,
-                             const std::function<Result<void>(PlacedBlock& block)>& use);
+                             uint64_t unplaced, const std::function<Result<void>(PlacedBlock& block)>& use);
 
 /// Vertices of one cell, each once; triangles of every level of detail index the same ones.
 struct WeldedMesh {

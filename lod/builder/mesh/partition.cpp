@@ -8,7 +8,7 @@ namespace {
 
 constexpr int32_t kNever = std::numeric_limits<int32_t>::min();
 constexpr int kPasses = 4;            ///< of borders that are moved
-constexpr size_t kMostUseless = 15;       ///< moves in a row that do not help
+constexpr size_t kMostUseless = 15;   ///< moves in a row that do not help
 constexpr uint32_t kAllTried = 4096;  ///< above it a set is halved where it lies: each move looks at all of it
 
 /// A set of vertices, numbered as they lie in it, in two halves.
@@ -36,15 +36,15 @@ class Halves {
         side_.assign(count_, 1);
         std::fill_n(side_.begin(), target, uint8_t{0});
         if (count_ > kAllTried) return side_;
-        int64_t least_cut = moveBorder(least, most);
+        int64_t shortest = moveBorder(least, most);
         std::vector<uint8_t> best = side_;
         uint32_t from = 0;
         for (int k = 0; k < 2; ++k) {
             from = farthestFrom(from);
             growFrom(from, target);
             const int64_t cut = moveBorder(least, most);
-            if (cut < least_cut) best = side_;
-            least_cut = std::min(least_cut, cut);
+            if (cut < shortest) best = side_;
+            shortest = std::min(shortest, cut);
         }
         return best;
     }
@@ -128,6 +128,8 @@ class Halves {
     /// Moves vertices to the other half, each once a pass, also where that does not help at first, and takes back what
     /// did not. Returns what the border weighs.
     int64_t moveBorder(uint32_t least, uint32_t most) {
+        // On the way the halves may be larger and smaller by one, or those of exact sizes would never change.
+        const uint32_t fewest = std::max(least, 2u) - 1, largest = std::min(most + 1, count_ - 1);
         int64_t best = cut();
         for (int pass = 0; pass < kPasses; ++pass) {
             findGains();
@@ -138,13 +140,13 @@ class Halves {
             int64_t now = best;
             size_t kept = 0;
             while (moves.size() <= kept + kMostUseless) {
-                const uint32_t v = bestMove(first > least, first < most);
+                const uint32_t v = bestMove(first > fewest, first < largest);
                 if (v == ~0u) break;
                 now -= gain_[v];
-                first += side_[v] == 0 ? ~0u : 1u;
+                first = side_[v] == 0 ? first - 1 : first + 1;
                 move(v);
                 moves.push_back(v);
-                if (now >= best) continue;
+                if (now >= best || first < least || first > most) continue;
                 best = now;
                 kept = moves.size();
             }
@@ -183,8 +185,8 @@ class Partition {
         const auto target = static_cast<uint32_t>(uint64_t{count} * left / parts);
         const auto leastOf = [&](uint32_t n) { return (n * size_ * 6 + 7) / 8; };
         const auto mostOf = [&](uint32_t n) { return n * size_ * 9 / 8; };
-        const uint32_t least = std::max(leastOf(left), count - std::min(count, mostOf(right))),
-                       most = std::min(mostOf(left), count - std::min(count, leastOf(right)));
+        const uint32_t least = std::max({left, leastOf(left), count - std::min(count, mostOf(right))}),
+                       most = std::min({count - right, mostOf(left), count - std::min(count, leastOf(right))});
         const std::vector<uint8_t> side =
             Halves(graph_, set, numberOf_).best(target, std::min(least, target), std::max(most, target));
         std::vector<uint32_t> halves[2];
@@ -202,13 +204,13 @@ class Partition {
             isMoved = false;
             for (uint32_t v = 0; v < graph_.count(); ++v) {
                 const uint32_t own = part_[v];
-                if (count[own] * 8 <= size_ * 5) continue;
+                if ((count[own] - 1) * 8 < size_ * 5) continue;
                 const auto first = graph_.start[v], last = graph_.start[v + 1];
                 for (uint32_t e = first; e < last; ++e) shared[part_[graph_.neighbour[e]]] += graph_.weight[e];
                 uint32_t to = own;
                 for (uint32_t e = first; e < last; ++e) {
                     const uint32_t p = part_[graph_.neighbour[e]];
-                    if (p != own && count[p] * 4 < size_ * 5 && shared[p] > shared[to]) to = p;
+                    if (p != own && (count[p] + 1) * 4 <= size_ * 5 && shared[p] > shared[to]) to = p;
                 }
                 for (uint32_t e = first; e < last; ++e) shared[part_[graph_.neighbour[e]]] = 0;
                 if (to == own) continue;

@@ -13,10 +13,11 @@ struct ClusterGraph {
     uint32_t count() const { return static_cast<uint32_t>(start.size() - 1); }
 };
 
-/// For each vertex the number of its part: as many parts as it takes for `size` vertices each, of 5/8 to 5/4 of that,
-/// with little weight between them. Halves are halved again, each the best of some beginnings whose borders are moved
-/// while that helps (Fiduccia and Mattheyses 1982); then vertices go to the part beside theirs that they share more
-/// with. The same graph gives the same parts, on any number of threads at once.
+/// For each vertex the number of its part: as many parts as it takes for `size` vertices each, none empty, of 5/8 to
+/// 5/4 of that (rounded outwards; of fewer where there are too few), with little weight between them. Halves are halved
+/// again, each the best of some beginnings whose borders are moved while that helps (Fiduccia and Mattheyses 1982);
+/// then vertices go to the part beside theirs that they share more with. The same graph gives the same parts, on any
+/// number of threads at once.
 std::vector<uint32_t> partition(const ClusterGraph& graph, uint32_t size);
 
 }  // namespace stipple::lod

@@ -25,10 +25,9 @@ class PartFinder {
     /// Triangles of a mesh that is looked at as a whole; of a larger one no part is known.
     static constexpr uint64_t kMostTriangles = uint64_t{1} << 21;
     /// Memory at most: a triangle's centre and position 16, a vertex's position 12, its numbers by hash 12, its parent
-    /// 4, a twentieth more for how deques keep them; and the block that is looked at, as it is read and as it is
-    /// placed.
+    /// 4, a twentieth more for how deques keep them; and two blocks, as they are read and as they are placed.
     static constexpr uint64_t memory(uint64_t triangles, uint64_t vertices) {
-        constexpr uint64_t kTriangleBytes = 17, kVertexBytes = 29, kBlockBytes = uint64_t{36} << 20;
+        constexpr uint64_t kTriangleBytes = 17, kVertexBytes = 29, kBlockBytes = uint64_t{56} << 20;
         return triangles * kTriangleBytes + vertices * kVertexBytes + kBlockBytes;
     }
     explicit PartFinder(const Lattice& lattice = {});
@@ -64,8 +63,8 @@ uint32_t partsOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vect
 void appendWholeClusters(const LocalMesh& local, const std::vector<std::vector<uint32_t>>& parts,
                          std::vector<Cluster>& out);
 
-/// Groups of about `size` clusters each, no part in two: of those with isWhole in their order, of the others by the borders
-/// they share.
+/// Groups of about `size` clusters each, no part in two: of those with isWhole in their order, of the others by the
+/// borders they share.
 std::vector<std::vector<uint32_t>> groupAll(const WeldedMesh& mesh, const std::vector<Cluster>& clusters, uint32_t size,
                                             Executor& executor);
 

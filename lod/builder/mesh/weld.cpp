@@ -134,7 +134,7 @@ PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor&
 }
 
 Result<void> forPlacedBlocks(const MeshSource& source, const Lattice& lattice, Executor& executor, Placed what,
-                             const std::function<Result<void>(PlacedBlock& block)>& use) {
+                             uint64_t unplaced, const std::function<Result<void>(PlacedBlock& block)>& use) {
     TriangleMesh block;
     PlacedBlock next;
     std::unique_ptr<Executor::Beside> placing;  // ends before what it writes to
@@ -143,7 +143,17 @@ Result<void> forPlacedBlocks(const MeshSource& source, const Lattice& lattice, E
         placing.reset();
         return std::move(next);
     };
+    uint64_t number = 0;
     STIPPLE_TRY(source.read([&](const TriangleMesh& read) -> Result<void> {
+        if (number++ < unplaced) {
+            PlacedBlock known;
+            known.given = read.indices.size() / 3;
+            return use(known);
+        }
+        if (executor.threads() == 1) {
+            PlacedBlock only = placeBlock(read, lattice, executor, what);
+            return use(only);
+        }
         std::optional<PlacedBlock> before;
         if (placing != nullptr) before = taken();
         block = read;  // the source goes on with its own

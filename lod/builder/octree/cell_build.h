@@ -36,6 +36,7 @@ class CellSender {
     bool isOwn(size_t subtree) const { return workspace_.isOwn(subtree); }
     /// For each block of the input: was it sent by an earlier run? Then it is only to be counted.
     bool begins() { return block_++ < blocksSent_; }
+    uint64_t blocksSent() const { return blocksSent_; }
     /// See CellInputs.
     Result<void> append(size_t subtree, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread = false);
     /// After each block. `flush` sends what waits.
