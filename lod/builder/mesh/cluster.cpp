@@ -124,9 +124,9 @@ struct BorderEdge {
 std::vector<BorderEdge> borderEdges(const WeldedMesh& mesh, const std::vector<Cluster>& clusters, Executor& executor) {
     std::vector<std::vector<BorderEdge>> borders(clusters.size());
     executor.parallelFor(clusters.size(), 64, [&](size_t begin, size_t end) {
-        // How often the cluster has each edge: open addressing, at least two places for each there can be.
-        constexpr uint32_t kSlots = 2048;
-        static_assert(kSlots >= 2 * 3 * shared::kClusterTriangles);
+        // How often the cluster has each edge: open addressing, more places than there can be edges.
+        constexpr uint32_t kSlots = 1024;
+        static_assert(kSlots > 3 * shared::kClusterTriangles);
         struct Slot {
             uint64_t key = ~uint64_t{0};
             uint32_t uses = 0;
@@ -139,7 +139,7 @@ std::vector<BorderEdge> borderEdges(const WeldedMesh& mesh, const std::vector<Cl
                 for (size_t k = 0; k < 3; ++k) {
                     const uint64_t a = mesh.position[t[i + k]], b = mesh.position[t[i + (k + 1) % 3]];
                     const uint64_t key = std::min(a, b) << 32 | std::max(a, b);
-                    uint64_t at = (key ^ key >> 32) * 0x9e3779b97f4a7c15ull >> 53;
+                    uint64_t at = (key ^ key >> 32) * 0x9e3779b97f4a7c15ull >> 54;
                     while (slots[at].uses > 0 && slots[at].key != key) at = (at + 1) % kSlots;
                     slots[at].key = key;
                     ++slots[at].uses;

@@ -29,11 +29,25 @@ using Triple = std::array<uint32_t, 3>;
 /// Triangles in an order and form that lets equal ones be found: the smallest corner first, turned as before.
 std::vector<Triple> sorted(const std::vector<uint32_t>& indices) {
     std::vector<Triple> out(indices.size() / 3);
+    uint32_t any = 0;
     for (size_t i = 0; i < out.size(); ++i) {
-        out[i] = {indices[3 * i], indices[3 * i + 1], indices[3 * i + 2]};
-        std::rotate(out[i].begin(), std::min_element(out[i].begin(), out[i].end()), out[i].end());
+        const uint32_t a = indices[3 * i], b = indices[3 * i + 1], c = indices[3 * i + 2];
+        out[i] = a <= b && a <= c ? Triple{a, b, c} : b <= c ? Triple{b, c, a} : Triple{c, a, b};
+        any |= a | b | c;
     }
-    std::sort(out.begin(), out.end());
+    constexpr int kBits = 21;  // three to a word, in the same order
+    constexpr uint64_t kMask = (uint64_t{1} << kBits) - 1;
+    if (any > kMask) {
+        std::sort(out.begin(), out.end());
+        return out;
+    }
+    std::vector<uint64_t> words(out.size());
+    for (size_t i = 0; i < out.size(); ++i)
+        words[i] = uint64_t{out[i][0]} << 2 * kBits | uint64_t{out[i][1]} << kBits | out[i][2];
+    std::sort(words.begin(), words.end());
+    for (size_t i = 0; i < out.size(); ++i)
+        out[i] = {static_cast<uint32_t>(words[i] >> 2 * kBits), static_cast<uint32_t>(words[i] >> kBits & kMask),
+                  static_cast<uint32_t>(words[i] & kMask)};
     return out;
 }
 
