@@ -197,7 +197,13 @@ void allowThreads(size_t threads) {
 class TbbBeside final : public Executor::Beside {
   public:
     TbbBeside(tbb::task_arena& arena, const std::function<void()>& task) : arena_(arena) {
-        arena_.execute([&] { group_.run(task); });
+        try {
+            arena_.execute([&] { group_->run(task); });
+        } catch (...) {
+            // (No memory: TBB has counted a task that it could not make, for which its group would wait forever.)
+            (void)group_.release();
+            throw;
+        }
     }
     ~TbbBeside() noexcept override {
         if (!isOver_) try {
@@ -207,12 +213,12 @@ class TbbBeside final : public Executor::Beside {
     }
     void wait() override {
         isOver_ = true;
-        arena_.execute([&] { group_.wait(); });
+        arena_.execute([&] { group_->wait(); });
     }
 
   private:
     tbb::task_arena& arena_;
-    tbb::task_group group_;
+    std::unique_ptr<tbb::task_group> group_ = std::make_unique<tbb::task_group>();
     bool isOver_ = false;
 };
 
