@@ -86,7 +86,7 @@ PagedArray::PagedArray(const std::string& folder, uint64_t memoryBytes, size_t b
         return;
     }
     parts_ = (count * bytes + kHugePage - 1) / kHugePage;
-    std::vector<uint64_t> sizes(parts_, kHugePage);
+    std::vector<uint64_t> sizes(parts_, kHugePage);  // (side by side without a gap: each ends where the next may begin)
     sizes.back() = count * bytes - (parts_ - 1) * kHugePage;
     whole_ = std::make_unique<HugeRegion>(sizes);
     first_ = whole_->part(0).data();
