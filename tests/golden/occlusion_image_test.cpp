@@ -142,32 +142,36 @@ double tracedOpenness(const dvec3& place, const dvec3& normal, double radius, co
     return 1 - hidden / (kRays * kRays);
 }
 
-struct Difference {
-    double mean = 0, p95 = 0, blind = 0;  ///< blind: the mean where nothing is computed
-    size_t pixels = 0;
-};
-Difference differenceOf(const Image& geometry, const std::vector<double>& open, const lod::View& view, double radius,
-                        const Trace& trace) {
-    std::vector<double> off;
-    Difference d;
-    for (size_t i = 0; i < open.size(); i += 7) {
-        if (open[i] < 0) continue;
-        const double x = double(i % view.width) + 0.5 - 0.5 * view.width,
-                     y = double(i / view.width) + 0.5 - 0.5 * view.height;
-        const dvec3 ray = view.forward + x / view.focalPixels * view.right + y / view.focalPixels * view.down;
-        const dvec3 n(geometry.normal[3 * i], geometry.normal[3 * i + 1], geometry.normal[3 * i + 2]);
-        const double truth = tracedOpenness(view.eye + double(geometry.depth[i]) * ray, n, radius, trace);
-        off.push_back(std::abs(open[i] - truth));
-        d.mean += off.back();
-        d.blind += 1 - truth;
+/// Of pixels of one or more pictures, how far they are from what rays say.
+class Difference {
+  public:
+    /// Of one pixel of seven, so that each place of the pattern (of four by four) is met.
+    void add(const Image& geometry, const std::vector<double>& open, const lod::View& view, double radius,
+             const Trace& trace) {
+        for (size_t i = 0; i < open.size(); i += 7) {
+            if (open[i] < 0) continue;
+            const double x = double(i % view.width) + 0.5 - 0.5 * view.width,
+                         y = double(i / view.width) + 0.5 - 0.5 * view.height;
+            const dvec3 ray = view.forward + x / view.focalPixels * view.right + y / view.focalPixels * view.down;
+            const dvec3 n(geometry.normal[3 * i], geometry.normal[3 * i + 1], geometry.normal[3 * i + 2]);
+            const double truth = tracedOpenness(view.eye + double(geometry.depth[i]) * ray, n, radius, trace);
+            off_.push_back(std::abs(open[i] - truth));
+            sum_ += off_.back();
+            hidden_ += 1 - truth;
+        }
     }
-    std::sort(off.begin(), off.end());
-    d.pixels = off.size();
-    d.mean /= double(off.size());
-    d.blind /= double(off.size());
-    d.p95 = off[off.size() * 95 / 100];
-    return d;
-}
+    size_t pixels() const { return off_.size(); }
+    double mean() const { return sum_ / double(off_.size()); }
+    double blind() const { return hidden_ / double(off_.size()); }  ///< the mean where nothing is computed
+    double p95() {
+        std::sort(off_.begin(), off_.end());
+        return off_[off_.size() * 95 / 100];
+    }
+
+  private:
+    std::vector<double> off_;
+    double sum_ = 0, hidden_ = 0;
+};
 
 TEST_F(AmbientOcclusion, IsNearWhatRaysAllAroundSay) {
     constexpr double kRadius = 1;
@@ -190,20 +194,27 @@ TEST_F(AmbientOcclusion, IsNearWhatRaysAllAroundSay) {
         const char* name;
         Shapes& shapes;
         const Trace& trace;
-        lod::View view;
+        dvec3 target, from;
     };
-    for (const Case& c : {Case{"sphere on a plane", ball, onBall, lookingAt({0, 0, 0.6}, {0, -5, 2.5})},
-                          Case{"corner of a box", corner, onCorner, lookingAt({-5, 5, 0.7}, {-2, 1, 3})}}) {
+    // The 95th percentile of one picture goes from 0.054 to 0.060 with where the pattern falls on the ball's borders:
+    // that of four pictures is of what is computed, not of where the camera stands.
+    for (const Case& c : {Case{"sphere on a plane", ball, onBall, {0, 0, 0.6}, {0, -5, 2.5}},
+                          Case{"corner of a box", corner, onCorner, {-5, 5, 0.7}, {-2, 1, 3}}}) {
         const auto store = c.shapes.built(folder_ / "s.stipple", *executor_);
-        const Image geometry = draw(store, usual(), c.view, inAmbientLight(0, true));
         for (const bool isFull : {false, true}) {
-            const Difference d =
-                differenceOf(geometry, openness(store, c.view, kRadius, isFull), c.view, kRadius, c.trace);
+            Difference d;
+            for (const double aside : {0.0, 0.01, 0.02, 0.03}) {
+                const lod::View view = lookingAt(c.target + dvec3(aside, 0, 0), c.from + dvec3(aside, 0, 0));
+                const Image geometry = draw(store, usual(), view, inAmbientLight(0, true));
+                d.add(geometry, openness(store, view, kRadius, isFull), view, kRadius, c.trace);
+            }
+            ASSERT_GT(d.pixels(), 4'000u);
+            const double p95 = d.p95();
             fmt::print("{}, {}: mean {:.4f}, p95 {:.4f} of the light off ({} pixels; without it {:.4f})\n", c.name,
-                       isFull ? "full" : "half", d.mean, d.p95, d.pixels, d.blind);
-            EXPECT_LT(d.mean, 0.015);
-            EXPECT_LT(d.p95, 0.06);
-            EXPECT_LT(d.mean, 0.35 * d.blind) << "it has to be worth something";
+                       isFull ? "full" : "half", d.mean(), p95, d.pixels(), d.blind());
+            EXPECT_LT(d.mean(), 0.015);
+            EXPECT_LT(p95, 0.06);
+            EXPECT_LT(d.mean(), 0.35 * d.blind()) << "it has to be worth something";
         }
     }
 }
