@@ -35,7 +35,8 @@ constexpr uint32_t kTexelGroup = 16;  ///< texels of a row that are made or left
 
 constexpr uint32_t kWidePixel = ~1u;  ///< in the place of a pixel's index: a wide disc
 
-/// A row of unpacked texels; entry x of a tile is at [kPad + x]. Entries -1 and n may be read as neighbours.
+/// A row of unpacked texels; entry x of a tile is at [kPad + x]. Entries -1 and n may be read as neighbours, and what
+/// lies beyond up to whole groups: it is whatever older rows have left, finite, and counts for nothing.
 struct TexelRow {
     static constexpr uint32_t kSize = kTile + 2 * kPad;
     // Plain arrays: references into std::array keep GCC 12 from vectorising.
@@ -45,17 +46,17 @@ struct TexelRow {
     alignas(64) float isRound[kSize], axisX[kSize], axisY[kSize];
     // Only of frames with materials of points (TexelSurface):
     alignas(64) float share[kSize], metallic[kSize], roughness[kSize];
-    // Only of coarse rows that are pushed from (coarseDisc):
-    alignas(64) float slopeX[kSize], slopeY[kSize], inverseDepth[kSize];
     bool hasTubes;  ///< or narrow ribbons
     bool hasMaterials;
     bool isRounded;  ///< to pack and unpack it would change nothing
 };
 
-/// A coarse row at the resolution of the fine one: for each fine texel its parent, and the parent's neighbour on the
-/// side on which the fine texel lies.
-struct ExpandedRow {
-    TexelRow nearest, beside;
+/// A coarse row that is pushed from, with its texels' discs (CoarseDisc).
+struct CoarseRow {
+    static constexpr uint32_t kSize = TexelRow::kSize;
+    TexelRow texels;
+    alignas(64) float slopeX[kSize], slopeY[kSize], inverseDepth[kSize], facing[kSize], front[kSize], end[kSize];
+    alignas(64) uint32_t kinds[kSize];
 };
 
 /// One level of the pyramid: five planes of packed texels, and a sixth in frames with materials of points.
@@ -380,18 +381,19 @@ struct Kernels {
     /// Groups (kTexelGroup) of texels of which some are there: of the others nothing is written. A bit each.
     uint32_t (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
     /// `held`: those groups; others become empty, and nothing of them is read. `to`: entry of the first in the row.
-    void (*unpackRow)(const Planes& from, uint32_t to, uint32_t n, uint32_t held, TexelRow& row);
+    /// `hasNormals`: else those of rows without tubes and materials are any.
+    void (*unpackRow)(const Planes& from, uint32_t to, uint32_t n, uint32_t held, bool hasNormals, TexelRow& row);
     void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float focal,
                     TexelRow& out);
     /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy. (x, y): centre of the row's
-    /// first texel, px from the principal point. `wanted`: groups of texels (kTexelGroup), a bit each; others are
-    /// empty.
-    void (*pushRow)(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, float x,
-                    float y, uint32_t n, uint32_t wanted, float fineSize, float focal, TexelRow& out);
-    /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x, with their discs (coarseDisc). (x, y): centre
-    /// of the coarse row's first texel, px from the principal point; `size`: edge of its texels, px.
-    void (*expandRow)(TexelRow& coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,
-                      TexelRow& beside);
+    /// first texel, px from the principal point. `wanted`: groups of texels (kTexelGroup), a bit each; others may be
+    /// left empty. `coloursAlone`: of rows without tubes depths, colours and materials are all that is made. Entries of
+    /// `out` behind the row's last are written, too.
+    void (*pushRow)(const TexelRow& fine, const CoarseRow& nearRow, const CoarseRow& farRow, float sy, float x, float y,
+                    uint32_t n, uint32_t wanted, float fineSize, float focal, bool coloursAlone, TexelRow& out);
+    /// Discs of a coarse row's entries -1 to (n + 1) / 2. (x, y): centre of its first texel, px from the principal
+    /// point; `size`: edge of its texels, px.
+    void (*coarseDiscs)(CoarseRow& row, uint32_t n, float x, float y, float size, float focal);
     /// Normals and depths of tubes, pixel by pixel, once a row is reconstructed.
     void (*finishRow)(float focal, uint32_t n, TexelRow& row);
     /// The surface of a reconstructed row; `own`: the row before. `planes`: from the row's first pixel on, or null.

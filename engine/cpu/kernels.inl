@@ -1,7 +1,11 @@
 // Included once per instruction set and kind of view, with STIPPLE_KERNELS naming the table and STIPPLE_ORTHOGRAPHIC
 // saying whether its views are orthographic (lens.h): what asks for that costs nothing. No header with functions of its
-// own may be included here except shaders/shared, whose functions are static: the linker must not mix instruction sets.
+// own may be included here except shaders/shared, whose functions are static, and intrinsics, which are always inlined: the
+// linker must not mix instruction sets.
 #include <cmath>
+#if defined(__SSE4_1__)
+#include <immintrin.h>
+#endif
 
 #include "engine/cpu/kernels.h"
 #include "shaders/shared/curve.h"
@@ -163,6 +167,7 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
         projectRecords<false, false>(f, node, records, count, to);
 }
 
+#include "engine/cpu/masks.inl"
 #include "engine/cpu/sample.inl"
 
 #include "engine/cpu/raster.inl"
@@ -189,63 +194,6 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 #include "engine/cpu/splat.inl"
 
 #include "engine/cpu/ewa.inl"
-
-/// Of kTexelGroup values side by side those above 0, by fours joined. (GCC unrolls loops over so few, and makes no SIMD of
-/// them.)
-using FourBits [[gnu::vector_size(16), gnu::aligned(4), gnu::may_alias]] = int;
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // of groups that were filled
-[[gnu::always_inline]] inline FourBits aboveZeroOf(const float* values) {
-    static_assert(kTexelGroup == 16);
-    const auto* const four = reinterpret_cast<const FourBits*>(values);
-    return ((four[0] > 0) | (four[1] > 0)) | ((four[2] > 0) | (four[3] > 0));
-}
-#pragma GCC diagnostic pop
-[[gnu::always_inline]] inline bool isAny(FourBits b) { return ((b[0] | b[1]) | (b[2] | b[3])) != 0; }
-/// Not 0 where a value is above it. (As whole numbers: of comparisons of floats that are joined GCC makes no SIMD.)
-[[gnu::always_inline]] inline int aboveZero(float value) {
-    const int bits = __builtin_bit_cast(int, value);
-    return bits > 0 ? bits : 0;
-}
-/// Of the groups of kTexelGroup texels of a row, those in which one of the rows holds any: a bit each.
-template <typename... Depths>
-[[gnu::always_inline]] inline uint32_t groupsHeld(uint32_t n, const Depths* __restrict... depths) {
-    uint32_t held = 0;
-    int rest = 0;
-    const uint32_t whole = n / kTexelGroup;
-    for (uint32_t group = 0; group < whole; ++group) {
-        held |= (isAny((aboveZeroOf(depths + group * kTexelGroup) | ...)) ? 1u : 0u) << group;
-    }
-    for (size_t i = size_t{whole} * kTexelGroup; i < n; ++i) rest |= (aboveZero(depths[i]) | ...);
-    return held | (rest != 0 ? 1u : 0u) << whole;
-}
-/// Of `groups`, those in which one of the values is above 0; others are not read.
-[[gnu::always_inline]] inline uint32_t groupsHeldOf(uint32_t groups, uint32_t n, const float* __restrict values) {
-    uint32_t held = 0;
-    for (uint32_t rest = groups; rest != 0u; rest &= rest - 1u) {
-        const auto group = uint32_t(__builtin_ctz(rest));
-        const float* const first = values + group * kTexelGroup;
-        const uint32_t count = n - group * kTexelGroup;
-        int any = 0;
-        if (count >= kTexelGroup)
-            any = isAny(aboveZeroOf(first)) ? 1 : 0;
-        else
-            for (size_t i = 0; i < count; ++i) any |= aboveZero(first[i]);
-        held |= (any != 0 ? 1u : 0u) << group;
-    }
-    return held;
-}
-/// Calls use(first, last) for groups side by side: what is the same for all texels is read once for all of them.
-template <typename Use>
-[[gnu::always_inline]] inline void forGroups(uint32_t groups, uint32_t n, const Use& use) {
-    while (groups != 0u) {
-        const auto first = uint32_t(__builtin_ctz(groups));
-        const auto count = uint32_t(__builtin_ctz(~(groups >> first)));
-        const uint32_t last = (first + count) * kTexelGroup;
-        use(size_t{first} * kTexelGroup, size_t{last < n ? last : n});
-        groups &= ~0u << (first + count);
-    }
-}
 
 #include "engine/cpu/resolve_points.inl"
 
@@ -290,7 +238,7 @@ uint32_t packRow(const TexelRow& row, uint32_t n, const Planes& planes) {
     return held;
 }
 
-template <bool hasTubes, bool hasMaterials>
+template <bool hasTubes, bool hasMaterials, bool hasNormals>
 [[gnu::always_inline]] inline void unpackTexels(const Planes& planes, uint32_t to, size_t first, size_t last,
                                                 TexelRow& __restrict row) {
     const float* __restrict const depth = planes.depth;
@@ -303,22 +251,28 @@ template <bool hasTubes, bool hasMaterials>
         p.depth = depth[i];
         p.size = size[i];
         p.offset = offset[i];
-        p.normal = normal[i];
+        p.normal = hasNormals ? normal[i] : 0u;
         p.colour = colour[i];
         Texel t = hasTubes ? unpackAnyTexel(p) : unpackTexel(p);
         if (hasMaterials) t.surface = unpackSurface(surface[i]);
         setTexel<hasTubes, hasMaterials>(row, to + i, t);
     }
 }
-void unpackRow(const Planes& planes, uint32_t to, uint32_t n, uint32_t held, TexelRow& row) {
+void unpackRow(const Planes& planes, uint32_t to, uint32_t n, uint32_t held, bool hasNormals, TexelRow& row) {
     const uint32_t all = ~0u >> (32u - (n + kTexelGroup - 1u) / kTexelGroup);
     if ((held & all) != all)
         for (size_t i = 0; i < n; ++i) row.depth[to + i] = 0.0f;
-    forRow(row.hasTubes, row.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
+    const bool isPlain = !hasNormals && !row.hasTubes && !row.hasMaterials;
+    if (isPlain)
         forGroups(held & all, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
-            unpackTexels<hasTubes, hasMaterials>(planes, to, first, last, row);
+            unpackTexels<false, false, false>(planes, to, first, last, row);
         });
-    });
+    else
+        forRow(row.hasTubes, row.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
+            forGroups(held & all, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
+                unpackTexels<hasTubes, hasMaterials, true>(planes, to, first, last, row);
+            });
+        });
 }
 
 template <bool hasTubes, bool hasMaterials>
@@ -348,103 +302,7 @@ void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float chi
     });
 }
 
-void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,
-               TexelRow& beside) {
-    const Lens lens = lensHere(focal);
-    // (As bits: of a condition that is the same for all, GCC makes no SIMD. Of rows without tubes isRound is not set.)
-    const uint32_t hasTubes = coarse.hasTubes ? ~0u : 0u;
-#pragma GCC ivdep
-    for (size_t i = 0; i < (n + 1) / 2 + 2; ++i) {
-        const size_t at = kPad - 1 + i;
-        Texel t;
-        t.depth = coarse.depth[at];
-        t.radius = coarse.radius[at];
-        t.offset = vec2(coarse.x[at], coarse.y[at]);
-        t.normalPerp = vec2(coarse.perpX[at], coarse.perpY[at]);
-        t.isRound = uintBitsToFloat(floatBitsToUint(coarse.isRound[at]) & hasTubes);
-        const CoarseDisc d = coarseDisc(t, x + (float(int(i)) - 1.0f) * size, y, lens);
-        coarse.slopeX[at] = d.slope.x;
-        coarse.slopeY[at] = d.slope.y;
-        coarse.inverseDepth[at] = d.inverseDepth;
-    }
-    const auto expand = [n](const float* __restrict from, float* __restrict to, float* __restrict side) {
-        from += kPad;
-        to += kPad;
-        side += kPad;
-#pragma GCC ivdep
-        for (size_t i = 0; i < (n + 1) / 2; ++i) {
-            to[2 * i] = from[i];
-            to[2 * i + 1] = from[i];
-        }
-#pragma GCC ivdep
-        for (size_t i = 0; i < (n + 1) / 2; ++i) {
-            side[2 * i] = (from - 1)[i];
-            side[2 * i + 1] = (from + 1)[i];
-        }
-    };
-    expand(coarse.depth, nearest.depth, beside.depth);
-    expand(coarse.radius, nearest.radius, beside.radius);
-    expand(coarse.thickness, nearest.thickness, beside.thickness);
-    expand(coarse.x, nearest.x, beside.x);
-    expand(coarse.y, nearest.y, beside.y);
-    expand(coarse.perpX, nearest.perpX, beside.perpX);
-    expand(coarse.perpY, nearest.perpY, beside.perpY);
-    expand(coarse.red, nearest.red, beside.red);
-    expand(coarse.green, nearest.green, beside.green);
-    expand(coarse.blue, nearest.blue, beside.blue);
-    expand(coarse.slopeX, nearest.slopeX, beside.slopeX);
-    expand(coarse.slopeY, nearest.slopeY, beside.slopeY);
-    expand(coarse.inverseDepth, nearest.inverseDepth, beside.inverseDepth);
-    if (coarse.hasMaterials) {
-        expand(coarse.share, nearest.share, beside.share);
-        expand(coarse.metallic, nearest.metallic, beside.metallic);
-        expand(coarse.roughness, nearest.roughness, beside.roughness);
-    }
-    if (!coarse.hasTubes) return;
-    expand(coarse.isRound, nearest.isRound, beside.isRound);
-    expand(coarse.axisX, nearest.axisX, beside.axisX);
-    expand(coarse.axisY, nearest.axisY, beside.axisY);
-}
-
-[[gnu::always_inline]] inline CoarseDisc discAt(const TexelRow& row, size_t i) {
-    CoarseDisc d;
-    d.slope = vec2(row.slopeX[i], row.slopeY[i]);
-    d.inverseDepth = row.inverseDepth[i];
-    return d;
-}
-
-template <bool hasTubes, bool hasMaterials>
-[[gnu::always_inline]] inline void pushTexelRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow,
-                                                const ExpandedRow& __restrict farRow, float sy, float x, float y,
-                                                size_t first, size_t last, float fineSize, float focal,
-                                                TexelRow& __restrict out) {
-    const Lens lens = lensHere(focal);
-#pragma GCC ivdep
-    for (size_t i = first; i < last; ++i) {
-        const size_t at = kPad + i;
-        const float sx = float(int(i & 1u) * 2 - 1);
-        const auto of = [at](const TexelRow& row) { return texelAt<hasTubes, hasMaterials>(row, at); };
-        setTexel<hasTubes, hasMaterials>(
-            out, at,
-            pushTexel(of(fine), of(nearRow.nearest), of(nearRow.beside), of(farRow.nearest), of(farRow.beside),
-                      discAt(nearRow.nearest, at), discAt(nearRow.beside, at), discAt(farRow.nearest, at),
-                      discAt(farRow.beside, at), sx, sy, x + float(int(i)) * fineSize, y, fineSize, lens));
-    }
-}
-
-void pushRow(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, float x, float y,
-             uint32_t n, uint32_t wanted, float fineSize, float focal, TexelRow& out) {
-    static_assert(kTile % kTexelGroup == 0 && kTile / kTexelGroup < 32);
-    const auto at = [](const TexelRow& row) { return row.depth + kPad; };
-    const uint32_t held =
-        wanted & groupsHeld(n, at(fine), at(nearRow.nearest), at(nearRow.beside), at(farRow.nearest), at(farRow.beside));
-    for (size_t i = 0; i < n; ++i) out.depth[kPad + i] = 0.0f;
-    forRow(out.hasTubes, out.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
-        forGroups(held, n, [&](size_t first, size_t last) __attribute__((always_inline)) {
-            pushTexelRow<hasTubes, hasMaterials>(fine, nearRow, farRow, sy, x, y, first, last, fineSize, focal, out);
-        });
-    });
-}
+#include "engine/cpu/push.inl"
 
 /// What tubes look like at each pixel: normals round their axes.
 void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
@@ -487,7 +345,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               unpackRow,
                               pullRow,
                               pushRow,
-                              expandRow,
+                              coarseDiscs,
                               finishRow,
                               surfaceRow,
                               smoothRow,

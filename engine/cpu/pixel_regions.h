@@ -58,7 +58,9 @@ class PixelRegions {
         void forEach(const Use& use) {
             for (int row = firstRow_; row <= lastRow_; ++row)
                 for (int column = firstColumn_; column <= lastColumn_; ++column)
-                    use(of_.regions_[static_cast<size_t>(row * of_.columns_ + column)].isHeld);
+                    use(of_.regions_[static_cast<size_t>(row) * static_cast<size_t>(of_.columns_) +
+                                     static_cast<size_t>(column)]
+                            .isHeld);
         }
         PixelRegions& of_;
         int firstColumn_, lastColumn_, firstRow_, lastRow_;

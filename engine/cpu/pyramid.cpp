@@ -39,7 +39,7 @@ void Pyramid::pull() {
         const Planes from = fine.planes();
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (!fine.mayHoldTile(x0, n, row0, row1) && !coarse.mayHoldParents(x0, n, row0, row1, false)) return;
-            TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
+            thread_local TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
             upper.hasTubes = lower.hasTubes = out.hasTubes = hasCurves_;
             upper.hasMaterials = lower.hasMaterials = out.hasMaterials = hasMaterials_;
             for (uint32_t y = row0; y < row1; y += 2) {
@@ -56,8 +56,8 @@ void Pyramid::pull() {
     }
 }
 
-bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n,
-                      TexelRow& row) const {
+bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, TexelRow& row,
+                      bool hasNormals) const {
     const size_t at = size_t{y} * level.width + x;
     const uint32_t held = level.held(y, x, n);
     // (The next row of a tile is a level's width away, where no processor looks by itself.)
@@ -65,19 +65,21 @@ bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint
     for (uint32_t rest = next; rest != 0; rest &= rest - 1) {
         const Planes from = planes.at(at + level.width + static_cast<size_t>(std::countr_zero(rest)) * kTexelGroup);
         __builtin_prefetch(from.depth);
-        for (const uint32_t* plane : {from.size, from.offset, from.normal, from.colour, from.surface})
+        for (const uint32_t* plane :
+             {from.size, from.offset, hasNormals ? from.normal : nullptr, from.colour, from.surface})
             if (plane != nullptr) __builtin_prefetch(plane);
     }
-    return loadTexels(planes.at(at), held, kPad, n, row);
+    return loadTexels(planes.at(at), held, kPad, n, hasNormals, row);
 }
 
-bool Pyramid::loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, TexelRow& row) const {
+bool Pyramid::loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, bool hasNormals,
+                         TexelRow& row) const {
     uint32_t signs = 0;
     for (uint32_t g = 0; hasCurves_ && held >> g != 0; ++g)
         for (uint32_t i = g * kTexelGroup; (held >> g & 1u) != 0 && i < std::min(n, (g + 1) * kTexelGroup); ++i)
             signs |= at.depth[i] > 0 ? at.size[i] : 0u;
     row.hasTubes = (signs & 0x80008000u) != 0;
-    k_.unpackRow(at, to, n, held, row);
+    k_.unpackRow(at, to, n, held, hasNormals, row);
     if (hasCurves_ && !row.hasTubes) {  // others beside it may have some
         std::fill_n(row.isRound + to, n, 0.0f);
         std::fill_n(row.axisX + to, n, 0.0f);
@@ -86,27 +88,28 @@ bool Pyramid::loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t 
 }
 
 bool Pyramid::loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
-                         TexelRow& scratch, ExpandedRow& out) const {
+                         CoarseRow& out) const {
+    TexelRow& row = out.texels;
+    row.hasTubes = hasCurves_;
+    row.hasMaterials = hasMaterials_;
     const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
     if (y < 0 || y >= static_cast<int>(level.height)) return false;
     const auto line = static_cast<uint32_t>(y);
     const auto at = [&](uint32_t x) { return planes.at(size_t{line} * level.width + x); };
-    bool any = loadRow(level, planes, line, c0, count, scratch), hasTubes = scratch.hasTubes;
+    bool any = loadRow(level, planes, line, c0, count, row), hasTubes = row.hasTubes;
     const auto loadBeside = [&](bool isInside, uint32_t x, uint32_t to) {
-        scratch.depth[to] = isInside ? 0 : kOutside;
+        row.depth[to] = isInside ? 0 : kOutside;
         if (!isInside || !level.mayHold(line, x, 1) || !(*at(x).depth > 0)) return;
-        any = loadTexels(at(x), 1, to, 1, scratch);
-        hasTubes = hasTubes || scratch.hasTubes;
+        any = loadTexels(at(x), 1, to, 1, true, row);
+        hasTubes = hasTubes || row.hasTubes;
     };
     loadBeside(c0 > 0, c0 - 1, kPad - 1);
     loadBeside(c0 + count < level.width, c0 + count, kPad + count);
     if (!any) return false;
-    scratch.hasTubes = hasTubes;
-    k_.expandRow(scratch, n, (static_cast<float>(c0) + 0.5f) * size - frame_.centre.x,
-                 (static_cast<float>(y) + 0.5f) * size - frame_.centre.y, size, frame_.focal, out.nearest, out.beside);
-    out.nearest.hasTubes = scratch.hasTubes;
-    if (hasCurves_ && !scratch.hasTubes)
-        for (TexelRow* row : {&out.nearest, &out.beside}) clearTubes(*row);
+    row.hasTubes = hasTubes;
+    if (hasCurves_ && !hasTubes) clearTubes(row);
+    k_.coarseDiscs(out, n, (static_cast<float>(c0) + 0.5f) * size - frame_.centre.x,
+                   (static_cast<float>(y) + 0.5f) * size - frame_.centre.y, size, frame_.focal);
     return true;
 }
 
@@ -118,7 +121,7 @@ void Pyramid::push() {
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (!fine.mayHoldTile(x0, n, row0, row1) && !coarse.mayHoldParents(x0, n, row0, row1, true)) return;
             pushTile(
-                fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1, [](uint32_t) { return ~0u; },
+                fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1, false, [](uint32_t) { return ~0u; },
                 [&](uint32_t y, const TexelRow&, const TexelRow& row, bool any) {
                     if (!any) return;
                     fine.hold(y, x0, n, k_.packRow(row, n, planes.at(size_t{y} * fine.width + x0)));

@@ -61,25 +61,27 @@ class Pyramid {
     void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, Level& to,
                   uint32_t x, uint32_t y, TexelRow& out);
     /// Unpacks n texels of a row; false (and only the depths set) if all are empty.
-    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, TexelRow& row) const;
+    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, TexelRow& row,
+                 bool hasNormals = true) const;
 
     /// Pushes coarse into fine over one tile, row by row: use(y, own row, pushed row, any).
     /// wanted(y): groups of texels (kTexelGroup) that are, a bit each; of rows without any nothing is loaded, and `any`
-    /// is false.
+    /// is false. `coloursAlone`: of rows without tubes nothing but depths, colours and materials is made.
     template <typename Wanted, typename Use>
     void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1,
-                  const Wanted& wanted, const Use& use) {
+                  bool coloursAlone, const Wanted& wanted, const Use& use) {
         const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
-        thread_local TexelRow scratch{}, own{}, out{};
-        thread_local std::array<ExpandedRow, 3> ring{};
-        scratch.hasTubes = own.hasTubes = out.hasTubes = hasCurves_;
-        scratch.hasMaterials = own.hasMaterials = out.hasMaterials = hasMaterials_;
-        std::array<bool, 3> has{};
+        thread_local TexelRow own{}, out{};
+        thread_local std::array<CoarseRow, 3> ring{};
+        own.hasTubes = out.hasTubes = hasCurves_;
+        own.hasMaterials = out.hasMaterials = hasMaterials_;
+        std::array<bool, 3> has{}, isEmptied{};
         std::array<int, 3> held{-2, -2, -2};
         const auto slotOf = [&](int c) {  // of coarse row c, which is there from here on
             const auto slot = static_cast<size_t>(c + 1) % 3;
+            if (held.at(slot) != c) isEmptied.at(slot) = false;
             if (held.at(slot) != c)
-                has.at(slot) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, c, x0, n, scratch, ring.at(slot));
+                has.at(slot) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, c, x0, n, ring.at(slot));
             held.at(slot) = c;
             return slot;
         };
@@ -91,33 +93,35 @@ class Pyramid {
             }
             const auto c = static_cast<int>(y / 2), beyond = y % 2 == 0 ? c - 1 : c + 1;
             const size_t nearSlot = slotOf(c), farSlot = slotOf(beyond);
-            const bool ownAny = loadRow(fine, finePlanes, y, x0, n, own);
+            const bool ownAny = loadRow(fine, finePlanes, y, x0, n, own, !coloursAlone);
             if (!has.at(nearSlot) && !has.at(farSlot)) {
                 use(y, own, own, ownAny);
                 continue;
             }
             for (const size_t slot : {nearSlot, farSlot}) {
-                if (has.at(slot)) continue;
+                if (has.at(slot) || isEmptied.at(slot)) continue;
+                isEmptied.at(slot) = true;
                 const bool isOutside = slot == farSlot && (beyond < 0 || beyond >= static_cast<int>(coarse.height));
-                std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
-                std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
+                std::fill_n(ring.at(slot).texels.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
+                k_.coarseDiscs(ring.at(slot), n, 0, 0, 2 * fineSize, frame_.focal);  // of which there are none
             }
-            out.hasTubes = own.hasTubes || (has.at(nearSlot) && ring.at(nearSlot).nearest.hasTubes) ||
-                           (has.at(farSlot) && ring.at(farSlot).nearest.hasTubes);
+            out.hasTubes = own.hasTubes || (has.at(nearSlot) && ring.at(nearSlot).texels.hasTubes) ||
+                           (has.at(farSlot) && ring.at(farSlot).texels.hasTubes);
             k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f,
                        (static_cast<float>(x0) + 0.5f) * fineSize - frame_.centre.x,
                        (static_cast<float>(y) + 0.5f) * fineSize - frame_.centre.y, n, groups, fineSize, frame_.focal,
-                       out);
+                       coloursAlone, out);
             use(y, own, out, true);
         }
     }
 
   private:
     /// The same of texels at hand; `held`: groups of them.
-    bool loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, TexelRow& row) const;
-    /// The expanded coarse row `y` around the fine columns [x0, x0 + n); empty outside the level.
+    bool loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, bool hasNormals, TexelRow& row) const;
+    /// The coarse row `y` around the fine columns [x0, x0 + n), with its discs; false, and nothing is there, outside
+    /// the level and where all are empty.
     bool loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
-                    TexelRow& scratch, ExpandedRow& out) const;
+                    CoarseRow& out) const;
 
     Executor& executor_;
     const Kernels& k_;

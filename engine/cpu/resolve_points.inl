@@ -10,7 +10,7 @@ struct Gathered {
     alignas(64) float front[kTile];  // depth by which each was the nearest
     alignas(64) uint8_t smooth[kTile];
     alignas(64) uint32_t positionXY[kTile], positionZ[kTile];  // of the records, which are read once
-    const DrawNode* node[kTile];                               // null: no point is shown
+    alignas(64) const DrawNode* node[kTile];                   // null: no point is shown
 };
 
 /// What the points of a row are: flags and masks of all of them.
@@ -144,7 +144,7 @@ struct OtherPixels {
 
 /// Pixels that show no point.
 void gatherNothing(uint32_t n, Gathered& g) {
-    for (size_t i = 0; i < n; ++i) g.node[i] = nullptr;
+    for (size_t i = 0; i < kTile; ++i) g.node[i] = nullptr;  // (whole groups of which are looked at)
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         g.front[i] = 0;
@@ -153,7 +153,9 @@ void gatherNothing(uint32_t n, Gathered& g) {
         g.flags[i] = kFlagNoNormal;
         g.material[i] = kPlainPoint;
         g.turned[i] = 0;
+        g.radius[i] = 0;
     }
+    for (size_t i = 0; i < kTile; ++i) g.positionXY[i] = g.positionZ[i] = 0;
     for (size_t i = 0; i < n; ++i) g.smooth[i] = 0;
 }
 
@@ -192,34 +194,31 @@ void gatherNothing(uint32_t n, Gathered& g) {
                 node.base.y + node.axisX.y * qx + node.axisY.y * qy + node.axisZ.y * qz,
                 node.base.z + node.axisX.z * qx + node.axisY.z * qy + node.axisZ.z * qz);
 }
-/// The same of those points among `count` side by side that are of the node.
-[[gnu::always_inline]] inline void placesInNode(const DrawNode& drawNode, const int32_t* __restrict isOf, size_t first,
-                                                size_t count, Gathered& __restrict g) {
+/// The same of those points of a group that are of the node: a bit each. `isFirst`: else others have places already.
+template <bool isFirst>
+[[gnu::always_inline]] inline void placesInNode(const DrawNode& drawNode, uint32_t isOf, size_t first,
+                                                Gathered& __restrict g) {
     const DrawNode node = drawNode;
+#pragma GCC unroll 1  // (of loops over so few GCC makes no SIMD once it has unrolled them)
 #pragma GCC ivdep
-    for (size_t i = 0; i < count; ++i) {
+    for (size_t i = 0; i < kTexelGroup; ++i) {
         const vec3 place = placeInNode(node, g.positionXY[first + i], g.positionZ[first + i]);
-        g.x[first + i] = isOf[i] != 0 ? place.x : g.x[first + i];
-        g.y[first + i] = isOf[i] != 0 ? place.y : g.y[first + i];
-        g.z[first + i] = isOf[i] != 0 ? place.z : g.z[first + i];
+        const bool is = (isOf >> uint32_t(i) & 1u) != 0u;
+        g.x[first + i] = is ? place.x : isFirst ? 0.0f : g.x[first + i];
+        g.y[first + i] = is ? place.y : isFirst ? 0.0f : g.y[first + i];
+        g.z[first + i] = is ? place.z : isFirst ? -1.0f : g.z[first + i];
     }
 }
-/// Places of the points of a row, and no radius where there is none: of each few side by side one node after the other,
-/// which are mostly one or two.
+/// Places of the points of a row: of each few side by side one node after the other, which are mostly one or two.
 void gatherPlaces(uint32_t n, Gathered& g) {
     constexpr int kNodesTogether = 4;
-    alignas(64) int32_t isOf[kTexelGroup];
     for (size_t first = 0; first < n; first += kTexelGroup) {
-        const size_t count = first + kTexelGroup < n ? kTexelGroup : n - first;
-        uint32_t left = 0;
-        for (size_t i = 0; i < count; ++i) left |= (g.node[first + i] != nullptr ? 1u : 0u) << i;
-        for (size_t i = 0; i < count; ++i) {
-            g.x[first + i] = g.y[first + i] = 0.0f;
-            g.z[first + i] = -1.0f;
-            g.radius[first + i] = (left >> i & 1u) != 0u ? g.radius[first + i] : 0.0f;
+        uint32_t left = kWholeGroup & ~equalBits(g.node + first, nullptr);
+        if (left == 0u) {
+            for (size_t i = first; i < first + kTexelGroup; ++i) g.z[i] = -1.0f;
+            continue;
         }
         for (int nodes = 0; left != 0u; ++nodes) {
-            const DrawNode* const node = g.node[first + size_t(__builtin_ctz(left))];
             if (nodes == kNodesTogether) {  // as of a forest from afar: one by one
                 for (; left != 0u; left &= left - 1u) {
                     const size_t i = first + size_t(__builtin_ctz(left));
@@ -230,11 +229,13 @@ void gatherPlaces(uint32_t n, Gathered& g) {
                 }
                 break;
             }
-            for (size_t i = 0; i < count; ++i) {
-                isOf[i] = g.node[first + i] == node ? 1 : 0;
-                left &= ~(uint32_t(isOf[i]) << i);
-            }
-            placesInNode(*node, isOf, first, count, g);
+            const size_t of = first + size_t(__builtin_ctz(left));
+            const uint32_t ofNode = equalBits(g.node + first, g.node[of]);
+            left &= ~ofNode;
+            if (nodes == 0)
+                placesInNode<true>(*g.node[of], ofNode, first, g);
+            else
+                placesInNode<false>(*g.node[of], ofNode, first, g);
         }
     }
 }

@@ -73,8 +73,8 @@ void findSmallEdges(SmallTriangles& __restrict t) {
         const int signedArea = (xa - x0) * (yb - y0) - (ya - y0) * (xb - x0);
         const bool isTurned = signedArea < 0;
         const int x1 = isTurned ? xb : xa, y1 = isTurned ? yb : ya, x2 = isTurned ? xa : xb, y2 = isTurned ? ya : yb;
-        const float i1 = isTurned ? t.inverse[2][i] : t.inverse[1][i],
-                    i2 = isTurned ? t.inverse[1][i] : t.inverse[2][i];
+        const float ia = t.inverse[1][i], ib = t.inverse[2][i];
+        const float i1 = isTurned ? ib : ia, i2 = isTurned ? ia : ib;
         const int area = isTurned ? -signedArea : signedArea;
         const float inverseArea = 1.0f / float(mostOf(area, 1));
         const float z0 = t.inverse[0][i] * inverseArea, z1 = i1 * inverseArea, z2 = i2 * inverseArea;

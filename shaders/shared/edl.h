@@ -41,8 +41,9 @@ SHARED_FN float edlDepth(float depth, float perDepth) {
 // Does it change a pixel with that material word? `shade`: FrameConstants'.
 SHARED_FN bool edlConcerns(uint material, uint shade, uint lit) {
     const bool isTriangle = (material & kPixelTriangle) != 0u;
-    const bool isUnlit = (shade & (isTriangle ? kShadeTriangles : kShadeLit)) == 0u;
-    return isUnlit || (lit & (isTriangle ? kEdlTriangles : kEdlPoints)) != 0u;
+    const uint light = shade & (isTriangle ? kShadeTriangles : kShadeLit);
+    const uint anyway = lit & (isTriangle ? kEdlTriangles : kEdlPoints);
+    return (light == 0u ? 1u : anyway) != 0u;  // (of conditions that are joined compilers make branches)
 }
 
 SHARED_END

@@ -116,7 +116,7 @@ const float kTriangleRadius = 0.25f;
 SHARED_FN int snapPixel(float p) { return int(floor(p * kSubpixel + 0.5f)); }
 
 // Edge from a to b (y down, triangle on the positive side): left edges go up, top edges are horizontal and go right.
-SHARED_FN bool isTopLeft(int dx, int dy) { return dy < 0 || (dy == 0 && dx > 0); }
+SHARED_FN bool isTopLeft(int dx, int dy) { return (dy == 0 ? -dx : dy) < 0; }
 
 // Where the ray through a pixel meets a triangle: weights of the second and third corner, in [0, 1]. `ray`: direction
 // in camera space; a, b, c: corners, counted from its origin (Moeller and Trumbore 1997, solved for the weights alone).

@@ -29,9 +29,11 @@ SHARED_FN float patchTriangleDepth(PixelRay ray, vec3 a, vec3 b, vec3 c, float n
     const float sum = wa + wb + wc;
     const float least = min(wa, min(wb, wc));
     const float most = max(wa, max(wb, wc));
-    const bool isIn = (least >= 0.0f || most <= 0.0f) && abs(sum) > 0.0f;
-    const float depth = (wa * a.z + wb * b.z + wc * c.z) / (isIn ? sum : 1.0f);
-    return isIn && depth >= nearPlane ? depth : kNoPatch;
+    // (One selection after the other: of conditions that are joined compilers make branches.)
+    const float isIn = max(least, -most) >= 0.0f ? abs(sum) : 0.0f;
+    const float depth = (wa * a.z + wb * b.z + wc * c.z) / (isIn > 0.0f ? sum : 1.0f);
+    const float met = isIn > 0.0f ? depth : -3.0e38f;
+    return met >= nearPlane ? met : kNoPatch;
 }
 
 // The disc of a sample.

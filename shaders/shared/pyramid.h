@@ -52,8 +52,7 @@ SHARED_FN vec3 texelNormal(Texel t) {
 // Normals are turned to the eye, since nobody knows which way they point. Of discs before an outline and behind it
 // these are opposite across the view: their mean would be a disc that faces the eye and stands out of the outline, a
 // knob. So they are added up to the side of the first one. (Tubes: as they are.)
-SHARED_FN vec3 besideFirst(Texel t, vec3 first, float isRound, float weight) {
-    const vec3 n = texelNormal(t);
+SHARED_FN vec3 besideFirst(vec3 n, vec3 first, float isRound, float weight) {
     const float along = n.x * first.x + n.y * first.y + n.z * first.z;
     const float signed_ = along < 0.0f && isRound < 0.5f ? -weight : weight;
     return vec3(signed_ * n.x, signed_ * n.y, signed_ * n.z);
@@ -81,20 +80,21 @@ SHARED_FN Blend addToBlend(Blend b, Texel t, float inverseDepth, float x, float 
     return b;
 }
 
-// Of the first of four texels that counts.
-SHARED_FN vec3 firstNormal(Texel t0, Texel t1, Texel t2, Texel t3, float w0, float w1, float w2) {
-    Texel first = t3;
-    first.normalPerp = vec2(w0 > 0.0f   ? t0.normalPerp.x
-                            : w1 > 0.0f ? t1.normalPerp.x
-                            : w2 > 0.0f ? t2.normalPerp.x
-                                        : t3.normalPerp.x,
-                            w0 > 0.0f   ? t0.normalPerp.y
-                            : w1 > 0.0f ? t1.normalPerp.y
-                            : w2 > 0.0f ? t2.normalPerp.y
-                                        : t3.normalPerp.y);
-    return texelNormal(first);
+// Of the first of four texels that counts. (One selection after the other: conditions that are joined take longer.)
+SHARED_FN vec3 firstNormal(vec3 n0, vec3 n1, vec3 n2, vec3 n3, float w0, float w1, float w2) {
+    vec3 first = vec3(w2 > 0.0f ? n2.x : n3.x, w2 > 0.0f ? n2.y : n3.y, w2 > 0.0f ? n2.z : n3.z);
+    first = vec3(w1 > 0.0f ? n1.x : first.x, w1 > 0.0f ? n1.y : first.y, w1 > 0.0f ? n1.z : first.z);
+    return vec3(w0 > 0.0f ? n0.x : first.x, w0 > 0.0f ? n0.y : first.y, w0 > 0.0f ? n0.z : first.z);
 }
 
+// `n`: Blend's normal, of texels whose weights are `weight` together.
+SHARED_FN vec2 blendedPerp(vec3 n, float weight, float isRound) {
+    const float s = weight > 0.0f ? 1.0f / weight : 0.0f;
+    const float unit = 1.0f / sqrt(max(n.x * n.x + n.y * n.y + n.z * n.z, 1.0e-30f));
+    const float toEye = n.z > 0.0f ? -unit : unit;
+    const float across = isRound > 0.5f ? s : toEye;
+    return vec2(n.x * across, n.y * across);
+}
 SHARED_FN Texel texelFromBlend(Blend b, float isRound, Lens lens) {
     Texel t;
     const float s = b.weight > 0.0f ? 1.0f / b.weight : 0.0f;
@@ -103,11 +103,7 @@ SHARED_FN Texel texelFromBlend(Blend b, float isRound, Lens lens) {
     t.radius = b.radius * s;
     t.thickness = b.thickness * s;
     t.offset = vec2(b.x * s, b.y * s);
-    const vec3 n = b.normal;
-    const float unit = 1.0f / sqrt(max(n.x * n.x + n.y * n.y + n.z * n.z, 1.0e-30f));
-    const float toEye = n.z > 0.0f ? -unit : unit;
-    const float across = isRound > 0.5f ? s : toEye;
-    t.normalPerp = vec2(n.x * across, n.y * across);
+    t.normalPerp = blendedPerp(b.normal, b.weight, isRound);
     t.colour = vec3(b.red * s, b.green * s, b.blue * s);
     t.isRound = isRound;
     t.axis = vec2(b.axisX * s, b.axisY * s);
@@ -118,9 +114,10 @@ SHARED_FN Texel texelFromBlend(Blend b, float isRound, Lens lens) {
 }
 
 // 1 for what may be merged: tubes with tubes, all else with all else, as the one says whose interval ends first.
-SHARED_FN float isLike(Texel t, float isRound) { return abs(t.isRound - isRound) < 0.5f ? 1.0f : 0.0f; }
+SHARED_FN float isLike(float one, float isRound) { return abs(one - isRound) < 0.5f ? 1.0f : 0.0f; }
 
 const float kFarAway = 3.0e38f;
+const float kNowhere = 3.3e38f;  // behind what is far away
 const float kLeastDepth = 1.0e-30f;
 
 // Depth of a child that reaches beyond its own texel, else kFarAway. The papers ask for more, that the ellipse contain
@@ -166,23 +163,27 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
                           : d1 + t1 <= back ? c1.isRound
                           : d2 + t2 <= back ? c2.isRound
                                             : c3.isRound;
-    const float w0 = d0 < kFarAway && d0 - t0 <= back ? isLike(c0, isRound) : 0.0f;
-    const float w1 = d1 < kFarAway && d1 - t1 <= back ? isLike(c1, isRound) : 0.0f;
-    const float w2 = d2 < kFarAway && d2 - t2 <= back ? isLike(c2, isRound) : 0.0f;
-    const float w3 = d3 < kFarAway && d3 - t3 <= back ? isLike(c3, isRound) : 0.0f;
+    const float w0 = d0 < kFarAway && d0 - t0 <= back ? isLike(c0.isRound, isRound) : 0.0f;
+    const float w1 = d1 < kFarAway && d1 - t1 <= back ? isLike(c1.isRound, isRound) : 0.0f;
+    const float w2 = d2 < kFarAway && d2 - t2 <= back ? isLike(c2.isRound, isRound) : 0.0f;
+    const float w3 = d3 < kFarAway && d3 - t3 <= back ? isLike(c3.isRound, isRound) : 0.0f;
     const float a0 = w0 * (c0.radius * c0.radius);
     const float a1 = w1 * (c1.radius * c1.radius);
     const float a2 = w2 * (c2.radius * c2.radius);
     const float a3 = w3 * (c3.radius * c3.radius);
-    const vec3 first = firstNormal(c0, c1, c2, c3, w0, w1, w2);
+    const vec3 n0 = texelNormal(c0);
+    const vec3 n1 = texelNormal(c1);
+    const vec3 n2 = texelNormal(c2);
+    const vec3 n3 = texelNormal(c3);
+    const vec3 first = firstNormal(n0, n1, n2, n3, w0, w1, w2);
     Blend b = emptyBlend();
-    b = addToBlend(b, c0, imageLinear(lens, max(c0.depth, kLeastDepth)), x0, y0, besideFirst(c0, first, isRound, a0),
+    b = addToBlend(b, c0, imageLinear(lens, max(c0.depth, kLeastDepth)), x0, y0, besideFirst(n0, first, isRound, a0),
                    a0);
-    b = addToBlend(b, c1, imageLinear(lens, max(c1.depth, kLeastDepth)), x1, y1, besideFirst(c1, first, isRound, a1),
+    b = addToBlend(b, c1, imageLinear(lens, max(c1.depth, kLeastDepth)), x1, y1, besideFirst(n1, first, isRound, a1),
                    a1);
-    b = addToBlend(b, c2, imageLinear(lens, max(c2.depth, kLeastDepth)), x2, y2, besideFirst(c2, first, isRound, a2),
+    b = addToBlend(b, c2, imageLinear(lens, max(c2.depth, kLeastDepth)), x2, y2, besideFirst(n2, first, isRound, a2),
                    a2);
-    b = addToBlend(b, c3, imageLinear(lens, max(c3.depth, kLeastDepth)), x3, y3, besideFirst(c3, first, isRound, a3),
+    b = addToBlend(b, c3, imageLinear(lens, max(c3.depth, kLeastDepth)), x3, y3, besideFirst(n3, first, isRound, a3),
                    a3);
     Texel t = texelFromBlend(b, isRound, lens);
     const float deepest = max(max(w0 * c0.depth, w1 * c1.depth), max(w2 * c2.depth, w3 * c3.depth));
@@ -197,10 +198,17 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     return t;
 }
 
-// What the push needs of a coarse texel beside itself.
+// What the push needs of a coarse texel beside itself: the same for all fine texels around it.
+const uint kCoarseEmpty = 1u;
+const uint kCoarseOutside = 2u;  // the image
+const uint kCoarseLeaf = 4u;
 struct CoarseDisc {
     vec2 slope;          // ellipseSlope
     float inverseDepth;  // imageLinear
+    float facing;        // texelNormal's part along the view
+    float front;         // its interval of depths; of an empty one both are kFarAway
+    float end;
+    uint kinds;  // kCoarse...
 };
 // Half the width to which an edge-on splat is drawn, pixels. Half a pixel would show it wherever it is; that sets the
 // outlines of round bodies, where all discs are seen edge-on, half a pixel out (and with them points of planes that no
@@ -212,6 +220,13 @@ SHARED_FN CoarseDisc coarseDisc(Texel t, float x, float y, Lens lens) {
     d.slope = ellipseSlope(t.normalPerp, t.isRound, max(t.radius, 1.0e-3f) * (0.5f / kEdgeOn), x + t.offset.x,
                            y + t.offset.y, lens);
     d.inverseDepth = imageLinear(lens, max(t.depth, kLeastDepth));
+    d.facing = texelNormal(t).z;
+    const float reach = thicknessWorld(t, lens, 1.0f / lens.focal);
+    d.front = t.depth > 0.0f ? t.depth - reach : kFarAway;
+    d.end = t.depth > 0.0f ? t.depth + reach : kFarAway;
+    const uint leaf = isLeaf(t.thickness, t.radius) > 0.5f ? kCoarseLeaf : 0u;
+    const uint none = t.depth < 0.0f ? kCoarseOutside : kCoarseEmpty;
+    d.kinds = t.depth > 0.0f ? leaf : none;
     return d;
 }
 
@@ -244,28 +259,33 @@ SHARED_FN float gapWeight(float rho2, float least) { return rho2 <= least ? 0.01
 const float kGapReach2 = 25.0f;
 const float kBorderReach2 = 4.0f;
 const float kBorderTexel = 8.0f;
-const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fine texel lie inside it
 
-// How much whatever is nearest of four coarse texels counts for a fine one that none of them reaches (`missed`): an
-// empty texel between four filled ones is not left open, within reason (large discs that only share a coarse texel are
-// not one surface). What lies outside the image (depth < 0) may be filled or not and does not keep a gap open. Between
-// leaves it stays open. So does what lies behind all four (`hindmost`): a point of the far side that shines through
-// between the near ones.
-SHARED_FN float gapBetween(float fineDepth, Texel q0, Texel q1, Texel q2, Texel q3, float missed, float least,
-                           float hindmost, float fineSize) {
-    const float leaves = max(max(q0.depth > 0.0f ? isLeaf(q0.thickness, q0.radius) : 0.0f,
-                                 q1.depth > 0.0f ? isLeaf(q1.thickness, q1.radius) : 0.0f),
-                             max(q2.depth > 0.0f ? isLeaf(q2.thickness, q2.radius) : 0.0f,
-                                 q3.depth > 0.0f ? isLeaf(q3.thickness, q3.radius) : 0.0f));
-    const float isSolid = 1.0f - leaves;
-    const float noneEmpty =
-        min(min(abs(q0.depth), abs(q1.depth)), min(abs(q2.depth), abs(q3.depth))) > 0.0f ? missed * isSolid : 0.0f;
-    const float isBorder = min(min(q0.depth, q1.depth), min(q2.depth, q3.depth)) < 0.0f ? 1.0f : 0.0f;
-    const float isLarge = fineSize > kBorderTexel ? 1.0f : 0.0f;
-    const float farthest = isBorder * isLarge > 0.5f ? kBorderReach2 : kGapReach2;
-    const float oneFilled = least < farthest ? noneEmpty : 0.0f;
-    const float shines = fineDepth > hindmost ? missed * isSolid : 0.0f;
-    return fineDepth <= 0.0f ? oneFilled : shines;
+// Four coarse texels side by side, as seen by the four fine ones between them.
+struct PushCell {
+    float isInside;  // 1: they are of one surface
+    float reach2;    // rho^2 up to which they close an empty texel that none of them reaches; -1: not at all
+    float hindmost;  // what lies behind this, and none of them reaches, they cover
+};
+// An empty texel between four filled ones is not left open, within reason (large discs that only share a coarse texel
+// are not one surface). What lies outside the image may be filled or not and does not keep a gap open. Between leaves
+// it stays open. So does what lies behind all four: a point of the far side that shines through between the near ones.
+SHARED_FN PushCell pushCell(CoarseDisc e0, CoarseDisc e1, CoarseDisc e2, CoarseDisc e3, float fineSize) {
+    const float nearEnd = min(min(e0.end, e1.end), min(e2.end, e3.end));
+    const float hindmost = max(max(e0.end, e1.end), max(e2.end, e3.end));
+    const float lastFront = max(max(e0.front, e1.front), max(e2.front, e3.front));
+    const uint kinds = e0.kinds | e1.kinds | e2.kinds | e3.kinds;
+    const float farthest = (kinds & kCoarseOutside) != 0u && fineSize > kBorderTexel ? kBorderReach2 : kGapReach2;
+    PushCell c;
+    c.isInside = lastFront <= nearEnd ? 1.0f : 0.0f;
+    c.reach2 = (kinds & (kCoarseEmpty | kCoarseLeaf)) != 0u ? -1.0f : farthest;
+    c.hindmost = (kinds & kCoarseLeaf) != 0u ? kNowhere : hindmost;
+    return c;
+}
+// 1 where whatever is nearest of the four counts for a fine texel that none of them reaches (`missed`).
+SHARED_FN float gapBetween(float fineDepth, PushCell cell, float missed, float least) {
+    const float gap = least < cell.reach2 ? missed : 0.0f;
+    const float shines = fineDepth > cell.hindmost ? missed : 0.0f;
+    return fineDepth <= 0.0f ? gap : shines;
 }
 
 SHARED_FN Texel chosenTexel(bool first, Texel a, Texel b) {
@@ -284,88 +304,136 @@ SHARED_FN Texel chosenTexel(bool first, Texel a, Texel b) {
     return t;
 }
 
-// Refines one fine texel from the four coarse texels around it. q0 is its parent, q1 the neighbour in x, q2 in y, q3 in
-// both; (sx, sy) = -1 or +1 say on which side of the parent's centre the fine texel lies. `fineSize`: its edge, pixels.
+// Of the four coarse texels around a fine one, q0 to q3: its parent, the parent's neighbour in x, that in y, that in
+// both.
+struct OfFour {
+    float of0;
+    float of1;
+    float of2;
+    float of3;
+};
+SHARED_FN OfFour ofFour(float of0, float of1, float of2, float of3) {
+    OfFour f;
+    f.of0 = of0;
+    f.of1 = of1;
+    f.of2 = of2;
+    f.of3 = of3;
+    return f;
+}
+
+// Centres of the four splats relative to the fine texel's centre, pixels. (sx, sy) = -1 or +1 say on which side of its
+// parent's centre the fine texel lies. `fineSize`: its edge, pixels.
+SHARED_FN OfFour pushX(Texel q0, Texel q1, Texel q2, Texel q3, float sx, float fineSize) {
+    const float nearX = -0.5f * fineSize * sx;
+    const float farX = nearX + 2.0f * fineSize * sx;
+    return ofFour(nearX + q0.offset.x, farX + q1.offset.x, nearX + q2.offset.x, farX + q3.offset.x);
+}
+SHARED_FN OfFour pushY(Texel q0, Texel q1, Texel q2, Texel q3, float sy, float fineSize) {
+    const float nearY = -0.5f * fineSize * sy;
+    const float farY = nearY + 2.0f * fineSize * sy;
+    return ofFour(nearY + q0.offset.y, nearY + q1.offset.y, farY + q2.offset.y, farY + q3.offset.y);
+}
+
+// A fine texel, as far as it decides whether it is replaced.
+struct PushedTo {
+    float depth;     // 0: nothing is there, or a splat beside the picture
+    float isMissed;  // 1: it does not reach its own texel's centre (of others that lies in the texel)
+};
+SHARED_FN PushedTo pushedTo(Texel own, float fineSize) {
+    const float off2 = own.offset.x * own.offset.x + own.offset.y * own.offset.y;
+    const float least2 = max(own.radius * own.radius, fineSize * fineSize);
+    PushedTo to;
+    to.depth = fineSize < 1.5f && isBeside(own.offset) > 0.5f ? 0.0f : own.depth;
+    to.isMissed = off2 > least2 ? 1.0f : 0.0f;
+    return to;
+}
+
+// How much each of the four counts for a fine texel.
+struct PushShares {
+    OfFour of;         // their weights; 0: not of what is in front
+    float isRound;     // of those that count
+    float isReplaced;  // 1: the fine texel is
+};
 // The fine texel is replaced iff it is empty or lies behind what the coarse ones say is in front of it (F13). Where no
-// coarse ellipse reaches it, it stays as it is, unless three of the coarse texels are filled and of one surface: then
+// coarse ellipse reaches it, it stays as it is, unless all four coarse texels are filled and of one surface: then
 // the texel lies inside that surface, and a gap there is only the averaging of the pull (a merged splat stands at the
-// middle of its parts), so the ellipses count with twice their radius.
+// middle of its parts), so the ellipses count with twice their radius. `rho2`: pushRho2 of the four.
+SHARED_FN PushShares pushShares(PushedTo fine, OfFour front, OfFour end, OfFour isRound, OfFour rho2, PushCell cell) {
+    const float least = min(min(rho2.of0, rho2.of1), min(rho2.of2, rho2.of3));
+    // Conditions as numbers: branches would keep compilers from turning loops over this function into SIMD.
+    const float missed = least < 1.0f ? 0.0f : 1.0f;
+    const float scale = missed * cell.isInside > 0.5f ? 0.25f : 1.0f;
+    const float between = gapBetween(fine.depth, cell, missed, least);
+    const float k0 = max(kernelWeight(rho2.of0 * scale), between * gapWeight(rho2.of0, least));
+    const float k1 = max(kernelWeight(rho2.of1 * scale), between * gapWeight(rho2.of1, least));
+    const float k2 = max(kernelWeight(rho2.of2 * scale), between * gapWeight(rho2.of2, least));
+    const float k3 = max(kernelWeight(rho2.of3 * scale), between * gapWeight(rho2.of3, least));
+    const float b0 = k0 > 0.0f ? end.of0 : kFarAway;
+    const float b1 = k1 > 0.0f ? end.of1 : kFarAway;
+    const float b2 = k2 > 0.0f ? end.of2 : kFarAway;
+    const float b3 = k3 > 0.0f ? end.of3 : kFarAway;
+    const float back = min(min(b0, b1), min(b2, b3));
+    PushShares s;
+    s.isRound = b0 <= back ? isRound.of0 : b1 <= back ? isRound.of1 : b2 <= back ? isRound.of2 : isRound.of3;
+    const float w0 = front.of0 <= back ? k0 * isLike(isRound.of0, s.isRound) : 0.0f;
+    const float w1 = front.of1 <= back ? k1 * isLike(isRound.of1, s.isRound) : 0.0f;
+    const float w2 = front.of2 <= back ? k2 * isLike(isRound.of2, s.isRound) : 0.0f;
+    const float w3 = front.of3 <= back ? k3 * isLike(isRound.of3, s.isRound) : 0.0f;
+    s.of = ofFour(w0, w1, w2, w3);
+    const float hasBlend = w0 + w1 + w2 + w3 > 0.0f ? 1.0f : 0.0f;
+    const float isBehind = fine.depth > back ? 1.0f : 0.0f;
+    const float isEmpty = fine.depth <= 0.0f ? 1.0f : 0.0f;
+    // (What is missed by its own splat others may reach.)
+    s.isReplaced = hasBlend * (isBehind + isEmpty + fine.isMissed) > 0.5f ? 1.0f : 0.0f;
+    return s;
+}
+
+// Sum of the normals of the four (besideFirst).
+SHARED_FN vec3 pushNormal(vec3 n0, vec3 n1, vec3 n2, vec3 n3, PushShares s) {
+    const vec3 first = firstNormal(n0, n1, n2, n3, s.of.of0, s.of.of1, s.of.of2);
+    const vec3 b0 = besideFirst(n0, first, s.isRound, s.of.of0);
+    const vec3 b1 = besideFirst(n1, first, s.isRound, s.of.of1);
+    const vec3 b2 = besideFirst(n2, first, s.isRound, s.of.of2);
+    const vec3 b3 = besideFirst(n3, first, s.isRound, s.of.of3);
+    return vec3(b0.x + b1.x + b2.x + b3.x, b0.y + b1.y + b2.y + b3.y, b0.z + b1.z + b2.z + b3.z);
+}
+SHARED_FN vec3 normalOfCoarse(Texel t, CoarseDisc d) { return vec3(t.normalPerp.x, t.normalPerp.y, d.facing); }
+// All else of them. `x`, `y`: pushX, pushY; `normal`: pushNormal.
+SHARED_FN Texel pushBlend(Texel q0, Texel q1, Texel q2, Texel q3, OfFour inverseDepth, OfFour x, OfFour y, vec3 normal,
+                          PushShares s, Lens lens) {
+    const vec3 none = vec3(0.0f, 0.0f, 0.0f);
+    Blend b = emptyBlend();
+    b = addToBlend(b, q0, inverseDepth.of0, x.of0, y.of0, none, s.of.of0);
+    b = addToBlend(b, q1, inverseDepth.of1, x.of1, y.of1, none, s.of.of1);
+    b = addToBlend(b, q2, inverseDepth.of2, x.of2, y.of2, none, s.of.of2);
+    b = addToBlend(b, q3, inverseDepth.of3, x.of3, y.of3, none, s.of.of3);
+    b.normal = normal;
+    return texelFromBlend(b, s.isRound, lens);
+}
+
+// Refines one fine texel from the four coarse texels around it.
 // `e0` to `e3`: coarseDisc of q0 to q3; (x, y): centre of the fine texel, px from the principal point.
 SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, CoarseDisc e0, CoarseDisc e1,
                           CoarseDisc e2, CoarseDisc e3, float sx, float sy, float x, float y, float fineSize,
                           Lens lens) {
-    const float inverseFocal = 1.0f / lens.focal;
+    const OfFour atX = pushX(q0, q1, q2, q3, sx, fineSize);
+    const OfFour atY = pushY(q0, q1, q2, q3, sy, fineSize);
+    const OfFour rho2 =
+        ofFour(pushRho2(q0, e0, x, y, atX.of0, atY.of0, lens), pushRho2(q1, e1, x, y, atX.of1, atY.of1, lens),
+               pushRho2(q2, e2, x, y, atX.of2, atY.of2, lens), pushRho2(q3, e3, x, y, atX.of3, atY.of3, lens));
+    const PushedTo to = pushedTo(own, fineSize);
+    const PushShares shares =
+        pushShares(to, ofFour(e0.front, e1.front, e2.front, e3.front), ofFour(e0.end, e1.end, e2.end, e3.end),
+                   ofFour(q0.isRound, q1.isRound, q2.isRound, q3.isRound), rho2, pushCell(e0, e1, e2, e3, fineSize));
+    const vec3 normal = pushNormal(normalOfCoarse(q0, e0), normalOfCoarse(q1, e1), normalOfCoarse(q2, e2),
+                                   normalOfCoarse(q3, e3), shares);
     Texel fine = own;
-    fine.depth = fineSize < 1.5f && isBeside(own.offset) > 0.5f ? 0.0f : own.depth;
-    const float coarseSize = 2.0f * fineSize;
-    // Centre of each coarse texel relative to the fine texel's centre, pixels.
-    const float nearX = -0.5f * fineSize * sx;
-    const float nearY = -0.5f * fineSize * sy;
-    const float farX = nearX + coarseSize * sx;
-    const float farY = nearY + coarseSize * sy;
-    const float x0 = nearX + q0.offset.x;
-    const float y0 = nearY + q0.offset.y;
-    const float x1 = farX + q1.offset.x;
-    const float y1 = nearY + q1.offset.y;
-    const float x2 = nearX + q2.offset.x;
-    const float y2 = farY + q2.offset.y;
-    const float x3 = farX + q3.offset.x;
-    const float y3 = farY + q3.offset.y;
-    const float r0 = pushRho2(q0, e0, x, y, x0, y0, lens);
-    const float r1 = pushRho2(q1, e1, x, y, x1, y1, lens);
-    const float r2 = pushRho2(q2, e2, x, y, x2, y2, lens);
-    const float r3 = pushRho2(q3, e3, x, y, x3, y3, lens);
-    const float t0 = thicknessWorld(q0, lens, inverseFocal);
-    const float t1 = thicknessWorld(q1, lens, inverseFocal);
-    const float t2 = thicknessWorld(q2, lens, inverseFocal);
-    const float t3 = thicknessWorld(q3, lens, inverseFocal);
-    const float least = min(min(r0, r1), min(r2, r3));
-    const float missed = least < 1.0f ? 0.0f : 1.0f;
-    const float n0 = q0.depth > 0.0f ? q0.depth : kFarAway;
-    const float n1 = q1.depth > 0.0f ? q1.depth : kFarAway;
-    const float n2 = q2.depth > 0.0f ? q2.depth : kFarAway;
-    const float n3 = q3.depth > 0.0f ? q3.depth : kFarAway;
-    const float nearBack = min(min(n0 + t0, n1 + t1), min(n2 + t2, n3 + t3));
-    const float together = (n0 - t0 <= nearBack ? 1.0f : 0.0f) + (n1 - t1 <= nearBack ? 1.0f : 0.0f) +
-                           (n2 - t2 <= nearBack ? 1.0f : 0.0f) + (n3 - t3 <= nearBack ? 1.0f : 0.0f);
-    // Conditions as numbers: branches would keep compilers from turning loops over this function into SIMD.
-    const float inside = together >= kSurrounding ? 1.0f : 0.0f;
-    const float scale = missed * inside > 0.5f ? 0.25f : 1.0f;
-    const float hindmost = max(max(n0 + t0, n1 + t1), max(n2 + t2, n3 + t3));
-    const float between = gapBetween(fine.depth, q0, q1, q2, q3, missed, least, hindmost, fineSize);
-    const float k0 = max(kernelWeight(r0 * scale), between * gapWeight(r0, least));
-    const float k1 = max(kernelWeight(r1 * scale), between * gapWeight(r1, least));
-    const float k2 = max(kernelWeight(r2 * scale), between * gapWeight(r2, least));
-    const float k3 = max(kernelWeight(r3 * scale), between * gapWeight(r3, least));
-    const float d0 = k0 > 0.0f ? q0.depth : kFarAway;
-    const float d1 = k1 > 0.0f ? q1.depth : kFarAway;
-    const float d2 = k2 > 0.0f ? q2.depth : kFarAway;
-    const float d3 = k3 > 0.0f ? q3.depth : kFarAway;
-    const float back = min(min(d0 + t0, d1 + t1), min(d2 + t2, d3 + t3));
-    const float isRound = d0 + t0 <= back   ? q0.isRound
-                          : d1 + t1 <= back ? q1.isRound
-                          : d2 + t2 <= back ? q2.isRound
-                                            : q3.isRound;
-    const float w0 = d0 < kFarAway && d0 - t0 <= back ? k0 * isLike(q0, isRound) : 0.0f;
-    const float w1 = d1 < kFarAway && d1 - t1 <= back ? k1 * isLike(q1, isRound) : 0.0f;
-    const float w2 = d2 < kFarAway && d2 - t2 <= back ? k2 * isLike(q2, isRound) : 0.0f;
-    const float w3 = d3 < kFarAway && d3 - t3 <= back ? k3 * isLike(q3, isRound) : 0.0f;
-    const vec3 first = firstNormal(q0, q1, q2, q3, w0, w1, w2);
-    Blend b = emptyBlend();
-    b = addToBlend(b, q0, e0.inverseDepth, x0, y0, besideFirst(q0, first, isRound, w0), w0);
-    b = addToBlend(b, q1, e1.inverseDepth, x1, y1, besideFirst(q1, first, isRound, w1), w1);
-    b = addToBlend(b, q2, e2.inverseDepth, x2, y2, besideFirst(q2, first, isRound, w2), w2);
-    b = addToBlend(b, q3, e3.inverseDepth, x3, y3, besideFirst(q3, first, isRound, w3), w3);
-    const float hasBlend = b.weight > 0.0f ? 1.0f : 0.0f;
-    const float isBehind = fine.depth > back ? 1.0f : 0.0f;
-    const float isEmpty = fine.depth <= 0.0f ? 1.0f : 0.0f;
-    // So is one that does not reach its own texel's centre (of splats beside the picture): others may.
-    const float off2 = fine.offset.x * fine.offset.x + fine.offset.y * fine.offset.y;
-    const float least2 =
-        max(fine.radius * fine.radius, fineSize * fineSize);  // (of others the centre lies in the texel)
-    const float isMissed = off2 > least2 ? 1.0f : 0.0f;
-    const bool replace = hasBlend * (isBehind + isEmpty + isMissed) > 0.5f;
-    return chosenTexel(replace, texelFromBlend(b, isRound, lens), fine);
+    fine.depth = to.depth;
+    return chosenTexel(
+        shares.isReplaced > 0.5f,
+        pushBlend(q0, q1, q2, q3, ofFour(e0.inverseDepth, e1.inverseDepth, e2.inverseDepth, e3.inverseDepth), atX, atY,
+                  normal, shares, lens),
+        fine);
 }
 
 SHARED_END

@@ -115,7 +115,7 @@ SHARED_FN float mirrorOff(Lens lens, float z, float zBefore, float depth, float 
 const float kMirrorFarOff = 2.0f;  // from there on it passes
 // Does a ray of that direction meet a surface with the normal n there?
 SHARED_FN bool mirrorMeets(float off, vec3 n, vec3 direction) {
-    return off < kMirrorFarOff && dot(n, direction) < 0.0f;
+    return max(off - kMirrorFarOff, dot(n, direction)) < 0.0f;  // (both are)
 }
 // How much counts what is met behind so many things that the ray has passed: at the fourth it is not followed on, and
 // that must not come at once.

@@ -80,7 +80,7 @@ cpu::Kernels countingKernels() {
     STIPPLE_COUNTED(packRow);
     STIPPLE_COUNTED(unpackRow);
     STIPPLE_COUNTED(pullRow);
-    STIPPLE_COUNTED(expandRow);
+    STIPPLE_COUNTED(coarseDiscs);
     STIPPLE_COUNTED(pushRow);
     STIPPLE_COUNTED(surfaceRow);
     STIPPLE_COUNTED(lightRow);

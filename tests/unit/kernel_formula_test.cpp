@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "engine/cpu/pyramid.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/shade.h"
 #include "shaders/shared/shadow.h"
@@ -228,7 +229,12 @@ TEST(KernelFormulas, TexelsArePackedAndUnpackedAsOne) {
     forKernels([](const cpu::Kernels& k, const FrameConstants&) {
         Rng rng(3);
         constexpr uint32_t n = cpu::kTile;
-        const auto row = std::make_unique<cpu::TexelRow>(), back = std::make_unique<cpu::TexelRow>();
+        const auto row = std::make_unique<cpu::TexelRow>(), back = std::make_unique<cpu::TexelRow>(),
+                   plain = std::make_unique<cpu::TexelRow>();
+        Texel nobody{};
+        nobody.depth = nobody.radius = nobody.thickness = -1;
+        nobody.colour = {-1, -1, -1};
+        nobody.offset = nobody.normalPerp = {-1, -1};
         row->hasTubes = back->hasTubes = false;
         std::vector<float> depth(n);
         std::vector<uint32_t> size(n), offset(n), normal(n), colour(n);
@@ -237,9 +243,14 @@ TEST(KernelFormulas, TexelsArePackedAndUnpackedAsOne) {
             std::vector<Texel> texels;
             for (uint32_t i = 0; i < n; ++i) put(*row, cpu::kPad + i, texels.emplace_back(randomTexel(rng, true)));
             k.packRow(*row, n, planes);
-            k.unpackRow(planes, cpu::kPad, n, ~0u, *back);
+            k.unpackRow(planes, cpu::kPad, n, ~0u, true, *back);
+            for (size_t i = 0; i < cpu::TexelRow::kSize; ++i) put(*plain, i, nobody);
+            k.unpackRow(planes, cpu::kPad, n, ~0u, false, *plain);
             for (uint32_t i = 0; i < n; ++i) {
                 const PackedTexel p = packTexel(texels[i]);
+                Texel withoutNormal = unpackTexel(p);
+                withoutNormal.normalPerp = {plain->perpX[cpu::kPad + i], plain->perpY[cpu::kPad + i]};
+                EXPECT_LE(farthest(*plain, cpu::kPad + i, withoutNormal), 1);
                 ASSERT_EQ(p.size, size[i]);
                 ASSERT_EQ(p.offset, offset[i]);
                 ASSERT_EQ(p.normal, normal[i]);
@@ -256,7 +267,7 @@ TEST(KernelFormulas, PulledAndPushedTexelsAreThoseOfTheFormulas) {
         constexpr uint32_t n = cpu::kTile / 2;
         const Lens lens = frameLens(f);
         const auto upper = std::make_unique<cpu::TexelRow>(), lower = std::make_unique<cpu::TexelRow>(),
-                   out = std::make_unique<cpu::TexelRow>();
+                   out = std::make_unique<cpu::TexelRow>(), colours = std::make_unique<cpu::TexelRow>();
         double worstPull = 0, worstPush = 0;
         size_t pulled = 0, pushed = 0;
         for (int round = 0; round < 100; ++round) {
@@ -265,7 +276,7 @@ TEST(KernelFormulas, PulledAndPushedTexelsAreThoseOfTheFormulas) {
             for (uint32_t i = 0; i < 2 * n; ++i)
                 for (const auto& [row, texels] : {std::pair{upper.get(), &a}, std::pair{lower.get(), &b}}) {
                     Texel t = randomTexel(rng, true);
-                    if (round % 2 == 0 && i < 2 * cpu::kTexelGroup) t.depth = 0;  // of a whole group of theirs
+                    if (round % 2 == 0 && i < 2 * cpu::kTexelGroup) t.depth = 0;  // of a whole group of their parents
                     put(*row, cpu::kPad + i, texels->emplace_back(t));
                 }
             k.pullRow(*upper, *lower, n, 1, f.focal, *out);
@@ -275,23 +286,22 @@ TEST(KernelFormulas, PulledAndPushedTexelsAreThoseOfTheFormulas) {
                 pulled += t.depth > 0;
             }
             // The push: `upper` is the fine row, two coarse rows around it.
-            const auto nearRow = std::make_unique<cpu::ExpandedRow>(), farRow = std::make_unique<cpu::ExpandedRow>();
-            const auto coarse = std::make_unique<cpu::TexelRow>();
+            const auto nearRow = std::make_unique<cpu::CoarseRow>(), farRow = std::make_unique<cpu::CoarseRow>();
             std::array<std::vector<Texel>, 2> rows;
             const float x = -100.5f, y = 37.5f, size = 2;
             for (size_t r = 0; r < 2; ++r) {
-                *coarse = {};
+                cpu::CoarseRow& to = r == 0 ? *nearRow : *farRow;
                 for (uint32_t i = 0; i < n + 2; ++i) {
                     Texel t = randomTexel(rng, true);
                     t.radius *= 2;
-                    if (round % 2 == 0 && i < cpu::kTexelGroup)
-                        t.depth = 0;  // of the first group of fine texels, and one beyond
-                    put(*coarse, cpu::kPad - 1 + i, rows.at(r).emplace_back(t));
+                    if (round % 2 == 0 && i < cpu::kTexelGroup + 2)
+                        t.depth = 0;  // of the first group of parents, and one on either side
+                    put(to.texels, cpu::kPad - 1 + i, rows.at(r).emplace_back(t));
                 }
-                auto& to = r == 0 ? *nearRow : *farRow;
-                k.expandRow(*coarse, 2 * n, x + 0.5f, y + (r == 0 ? 0.5f : 2.5f), size, f.focal, to.nearest, to.beside);
+                k.coarseDiscs(to, 2 * n, x + 0.5f, y + (r == 0 ? 0.5f : 2.5f), size, f.focal);
             }
-            k.pushRow(*upper, *nearRow, *farRow, 1, x, y, 2 * n, ~0u, 1, f.focal, *out);
+            k.pushRow(*upper, *nearRow, *farRow, 1, x, y, 2 * n, ~0u, 1, f.focal, false, *out);
+            k.pushRow(*upper, *nearRow, *farRow, 1, x, y, 2 * n, ~0u, 1, f.focal, true, *colours);
             for (uint32_t i = 0; i < 2 * n; ++i) {
                 const uint32_t at = i / 2 + 1, side = i % 2 == 0 ? at - 1 : at + 1;
                 const float sx = i % 2 == 0 ? -1.0f : 1.0f;
@@ -303,6 +313,13 @@ TEST(KernelFormulas, PulledAndPushedTexelsAreThoseOfTheFormulas) {
                     pushTexel(a[i], rows[0][at], rows[0][side], rows[1][at], rows[1][side], disc(0, at), disc(0, side),
                               disc(1, at), disc(1, side), sx, 1, x + float(int(i)), y, 1, lens);
                 worstPush = std::max(worstPush, farthest(*out, cpu::kPad + i, t));
+                Texel coloured = t;
+                const size_t to = cpu::kPad + i;
+                coloured.radius = colours->radius[to];
+                coloured.thickness = colours->thickness[to];
+                coloured.offset = {colours->x[to], colours->y[to]};
+                coloured.normalPerp = {colours->perpX[to], colours->perpY[to]};
+                worstPush = std::max(worstPush, farthest(*colours, to, coloured));
                 pushed += t.depth > 0;
             }
         }
@@ -310,6 +327,73 @@ TEST(KernelFormulas, PulledAndPushedTexelsAreThoseOfTheFormulas) {
         EXPECT_EQ(worstPush, 0);
         EXPECT_GT(pulled, 1000u);
         EXPECT_GT(pushed, 1000u);
+    });
+}
+
+/// Rows of any length, at the border of the picture, of any level, with tubes.
+TEST(KernelFormulas, PushedTexelsOfAnyRowAreThoseOfTheFormulas) {
+    forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
+        Rng rng(11);
+        const Lens lens = frameLens(f);
+        const auto fine = std::make_unique<cpu::TexelRow>(), out = std::make_unique<cpu::TexelRow>();
+        std::array<cpu::CoarseRow, 2> rows{};  // the parents', and the one beyond
+        double worst = 0;
+        size_t replaced = 0;
+        const auto texelOf = [&](bool hasTubes, bool mayBeOutside, float scale) {
+            Texel t = randomTexel(rng, true);
+            if (mayBeOutside && rng.below(5) == 0) t.depth = cpu::kOutside;
+            t.radius *= scale;
+            t.thickness *= scale;
+            t.isRound = hasTubes && rng.below(2) == 0 ? 1.0f : 0.0f;
+            if (t.isRound > 0) t.axis = {uniform(rng, -0.7, 0.7), uniform(rng, -0.7, 0.7)};
+            return t;
+        };
+        const auto putAny = [](cpu::TexelRow& row, size_t i, const Texel& t) {
+            put(row, i, t);
+            row.isRound[i] = t.isRound;
+            row.axisX[i] = t.axis.x;
+            row.axisY[i] = t.axis.y;
+        };
+        for (const uint32_t n : {1u, 5u, 31u, 33u, 127u, 128u})
+            for (const float sy : {-1.0f, 1.0f})
+                for (const float fineSize : {1.0f, 16.0f})
+                    for (const bool hasTubes : {false, true})
+                        for (int round = 0; round < 20; ++round) {
+                            std::vector<Texel> own;
+                            std::array<std::vector<Texel>, 2> coarse;
+                            for (uint32_t i = 0; i < n; ++i)
+                                putAny(*fine, cpu::kPad + i, own.emplace_back(texelOf(hasTubes, false, fineSize)));
+                            const float x = -100.5f, y = 37.5f, size = 2 * fineSize;
+                            for (size_t r = 0; r < 2; ++r) {
+                                for (uint32_t i = 0; i < (n + 1) / 2 + 2; ++i)
+                                    putAny(rows.at(r).texels, cpu::kPad - 1 + i,
+                                           coarse.at(r).emplace_back(texelOf(hasTubes, true, size)));
+                                rows.at(r).texels.hasTubes = hasTubes;
+                                k.coarseDiscs(rows.at(r), n, x, y + float(r) * sy * size, size, f.focal);
+                            }
+                            fine->hasTubes = out->hasTubes = hasTubes;
+                            k.pushRow(*fine, rows[0], rows[1], sy, x, y, n, ~0u, fineSize, f.focal, false, *out);
+                            for (uint32_t i = 0; i < n; ++i) {
+                                const uint32_t at = i / 2 + 1, side = i % 2 == 0 ? at - 1 : at + 1;
+                                const auto disc = [&](size_t r, uint32_t c) {
+                                    return coarseDisc(coarse.at(r)[c], x + (float(int(c)) - 1.0f) * size,
+                                                      y + float(r) * sy * size, lens);
+                                };
+                                const Texel t = pushTexel(own[i], coarse[0][at], coarse[0][side], coarse[1][at],
+                                                          coarse[1][side], disc(0, at), disc(0, side), disc(1, at),
+                                                          disc(1, side), i % 2 == 0 ? -1.0f : 1.0f, sy,
+                                                          x + float(int(i)) * fineSize, y, fineSize, lens);
+                                worst = std::max(worst, farthest(*out, cpu::kPad + i, t));
+                                if (hasTubes && t.depth > 0) {
+                                    ASSERT_EQ(out->isRound[cpu::kPad + i], t.isRound);
+                                    ASSERT_EQ(out->axisX[cpu::kPad + i], t.axis.x);
+                                    ASSERT_EQ(out->axisY[cpu::kPad + i], t.axis.y);
+                                }
+                                replaced += t.depth > 0 && t.depth != own[i].depth;
+                            }
+                        }
+        EXPECT_EQ(worst, 0);
+        EXPECT_GT(replaced, 10'000u);
     });
 }
 

@@ -8,6 +8,8 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "shaders/shared/pack.h"
+#include "tests/support/curves.h"
+#include "tests/support/shapes.h"
 #include "tests/support/support.h"
 #include "tests/unit/kernel_formulas.h"
 
@@ -64,7 +66,7 @@ TEST(ShortWays, ShowWhatLongOnesShow) {
     for (size_t k = 0; k < kernelCount; ++k)
         for (const auto& store : stores)
             for (const render::Mode mode : {render::Mode::surface, render::Mode::splat, render::Mode::points,
-                                            render::Mode::ewa, render::Mode::pullpushExact})
+                                            render::Mode::ewa, render::Mode::pullpushExact, render::Mode::pullpush})
                 for (const double tau : {1.0, 16.0})  // the latter: discs that mode surface smooths
                     for (const bool isLit : {false, true}) {
                         const cpu::Kernels kernels = countingKernels(*all[k]);
@@ -79,7 +81,7 @@ TEST(ShortWays, ShowWhatLongOnesShow) {
                                                              render::reconstructionOf(mode).name, tau, isLit);
                         EXPECT_TRUE(longWay.rgba == shortWay.rgba) << what;
                         for (const uint32_t pixel : shortWay.rgba) drawn += pixel >> 24 != 0 ? 1 : 0;
-                        const bool isShort = !isLit && mode != render::Mode::ewa;
+                        const bool isShort = !isLit && mode != render::Mode::ewa && mode != render::Mode::pullpush;
                         const bool mayBeWide = mode == render::Mode::surface;  // some rows
                         if (!mayBeWide) EXPECT_EQ(shown > 0, isShort) << what;
                         if (isShort && !mayBeWide) EXPECT_EQ(resolved, 0u) << what;
@@ -92,6 +94,43 @@ TEST(ShortWays, ShowWhatLongOnesShow) {
                     }
     EXPECT_GT(drawn, 100'000u * kernelCount);
     EXPECT_GT(wide, 0u) << "rows of discs that are smoothed";
+}
+
+/// Of texels that are pushed into pictures nothing but colours is made where nobody asks for more.
+TEST(ShortWays, PushColoursAloneAsWithTheRest) {
+    const test::TempFolder folder;
+    const auto executor = makeSerialExecutor();
+    test::writePly(folder / "a.ply", test::bumpySphere(8'000, 3));
+    test::Shapes shapes;
+    shapes.square({0, 0, -1}, {1, 0, 0}, {0, 1, 0});
+    shapes.ball({0.8, -0.5, 0.4}, 0.5);
+    std::vector<render::PlacedStore> placed{
+        {test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor), {}, {}},
+        {test::buildCurves(test::curls({.count = 40, .radius = 0.06f}), folder / "b.stipple", *executor), {}, {}},
+        {shapes.built(folder / "c.stipple", *executor), {}, {}}};
+    placed[1].place.translation = {1.2, 0.4, 0};
+    size_t kernelCount = 0, drawn = 0;
+    const cpu::Kernels* const* const all = cpu::availableKernels(kernelCount);
+    for (size_t k = 0; k < kernelCount; ++k)
+        for (const size_t count : {size_t{1}, size_t{3}})  // points alone, or all kinds
+            for (const bool isLit : {false, true})
+                for (const bool isParallel : {false, true})
+                    for (const uint32_t width : {1u, 15u, 257u}) {
+                        const auto backend = cpu::makeCpuBackend(*executor, all[k]);
+                        lod::View view = test::lookingAt({0.3, 0, 0}, {0, -4, 2}, isParallel);
+                        view.width = width;
+                        view.height = 131;
+                        render::FrameSettings settings = test::drawnAs(render::Mode::pullpush, 4, isLit);
+                        const std::vector<render::PlacedStore> some(placed.begin(), placed.begin() + long(count));
+                        const render::Image longWay = test::draw(some, *backend, *executor, view, settings);
+                        settings.wantDepthAndNormal = false;
+                        const render::Image shortWay = test::draw(some, *backend, *executor, view, settings);
+                        EXPECT_TRUE(longWay.rgba == shortWay.rgba)
+                            << all[k]->name << " of " << count << " lit " << isLit << " parallel " << isParallel
+                            << " width " << width;
+                        for (const uint32_t pixel : shortWay.rgba) drawn += pixel >> 24 != 0 ? 1 : 0;
+                    }
+    EXPECT_GT(drawn, 20'000u * kernelCount);
 }
 
 TEST(ShortWays, EveryByteIsShownAsOutputShowsIt) {
@@ -168,7 +207,7 @@ TEST(ShortWays, RoundedTexelsAreThoseThatWerePacked) {
             const cpu::Planes planes{
                 reinterpret_cast<float*>(plane(0)), plane(1), plane(2), plane(3), plane(4), nullptr};
             k.packRow(*packed, cpu::kTile, planes);
-            k.unpackRow(planes, cpu::kPad, cpu::kTile, ~0u, *packed);
+            k.unpackRow(planes, cpu::kPad, cpu::kTile, ~0u, true, *packed);
             for (size_t i = cpu::kPad; i < cpu::kPad + cpu::kTile; ++i) {
                 Texel t{};
                 t.depth = packed->depth[i];

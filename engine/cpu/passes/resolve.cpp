@@ -47,7 +47,7 @@ void resolve(Frame& frame) {
     std::atomic<float> largestRadius{0};
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         if (!isTouched(frame, fine, coarse, x0, n, row0, row1)) return;
-        TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
+        thread_local TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
         upper.hasTubes = lower.hasTubes = out.hasTubes = frame.hasCurves;
         upper.hasMaterials = lower.hasMaterials = out.hasMaterials = frame.constants.hasMaterials != 0;
         float largest = 0;

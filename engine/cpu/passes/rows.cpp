@@ -144,6 +144,11 @@ class RowProgram {
         const SurfaceWants wants = wantsOf(frame_.planesAt(0));
         return wants.depth || wants.ownDepth;
     }
+    /// Does nothing need more of texels than depths and colours?
+    bool needsColoursAlone() const {
+        const SurfaceWants wants = wantsOf(frame_.planesAt(0));
+        return !wants.depth && !wants.normal && !wants.leaf && !wants.ownDepth;
+    }
     /// Then this shows such a row.
     RowContent showPoints(uint32_t x0, uint32_t n, uint32_t y) const {
         const RowPlace at = placeOf(x0, n, y);
@@ -251,7 +256,7 @@ class TileTexels {
     void load(const Frame& frame, uint32_t n, uint32_t line, TexelRow& row) {
         row.hasTubes = hasTubes_.at(line);
         row.hasMaterials = frame.constants.hasMaterials != 0;
-        frame.k.unpackRow(planesOf(line), kPad, n, held_.at(line), row);
+        frame.k.unpackRow(planesOf(line), kPad, n, held_.at(line), true, row);
         if (frame.hasCurves && !row.hasTubes) Pyramid::clearTubes(row);
     }
 
@@ -307,7 +312,7 @@ class TileProgram {
             if (!isShown.at(line)) show(r, y, texels, line, row, any ? &smooth : nullptr);
         };
         frame_.pyramid.pushTile(frame_.pyramid.level(0), frame_.pyramid.level(1), 1.0f, r.x0, r.n, r.row0, r.row1,
-                                wanted, use);
+                                false, wanted, use);
     }
     void finish() const { resolver_.finish(); }
 
@@ -365,12 +370,13 @@ bool mayShow(Frame& frame, const TileRect& r) {
 
 /// A tile of a pyramid's texels.
 void pushTexels(Frame& frame, const RowProgram& program, const TileRect& rect) {
-    const auto [x0, n, row0, row1] = rect;
+    const uint32_t x0 = rect.x0, n = rect.n, row0 = rect.row0, row1 = rect.row1;
     Level& fine = frame.pyramid.level(0);
     if (frame.pyramid.isUsed()) {
         // The last push, into level 0.
         frame.pyramid.pushTile(
-            fine, frame.pyramid.level(1), 1.0f, x0, n, row0, row1, [](uint32_t) { return ~0u; },
+            fine, frame.pyramid.level(1), 1.0f, x0, n, row0, row1, program.needsColoursAlone(),
+            [](uint32_t) { return ~0u; },
             [&](uint32_t y, TexelRow& own, TexelRow& row, bool any) { program.run(x0, n, y, own, row, any); });
         return;
     }
