@@ -109,6 +109,16 @@ struct ProjectedBlock {
     int firstX, lastX, firstY, lastY;   ///< px; all pixels are among these; none: the first behind the last
 };
 
+/// The records of a block that claim a pixel, closed up.
+struct Claims {
+    static constexpr uint32_t kAhead =
+        48;  ///< pixels are scattered over 16 MB: so many before they are read they are asked for
+    uint32_t count;
+    alignas(64) uint32_t pixel[ProjectedBlock::kSize + kAhead];  ///< of as many behind the last, too
+    alignas(64) uint32_t depth[ProjectedBlock::kSize + kAhead];  ///< bits
+    alignas(64) uint32_t lane[ProjectedBlock::kSize + kAhead];   ///< of the block
+};
+
 struct BlockSource {
     const shared::PointRecord* records;  ///< first record of the block
     const shared::DrawNode* node;
@@ -367,6 +377,8 @@ struct Kernels {
     /// Up to 256 records. `besideToo`: also those beside the picture whose discs reach in; wide discs give kWidePixel.
     void (*projectBlock)(const shared::FrameConstants& f, const shared::DrawNode& node,
                          const shared::PointRecord* records, uint32_t count, bool besideToo, ProjectedBlock& to);
+    /// Those of the block's first `count` records that claim a pixel.
+    void (*findClaims)(const ProjectedBlock& block, uint32_t count, Claims& to);
     /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are
     /// empty.
     /// `planes`: from the row's first pixel on; null without triangles, 0 where none is seen.

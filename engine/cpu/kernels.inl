@@ -174,6 +174,7 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/small_triangles.inl"
 
+#include "engine/cpu/runs.inl"
 #include "engine/cpu/resolve_triangles.inl"
 
 #include "engine/cpu/patches.inl"
@@ -186,6 +187,7 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 #include "engine/cpu/discs.inl"
 
 #include "engine/cpu/curves.inl"
+#include "engine/cpu/resolve_curves.inl"
 
 #include "engine/cpu/place_discs.inl"
 
@@ -339,6 +341,7 @@ extern const Kernels STIPPLE_KERNELS, STIPPLE_KERNELS_ORTHOGRAPHIC;
 const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               &STIPPLE_KERNELS_ORTHOGRAPHIC,
                               projectBlock,
+                              findClaims,
                               resolveRow,
                               showPoints,
                               packRow,

@@ -1,5 +1,6 @@
-// Which of the texels of a group are something: a bit each. Loops that make one number of many lanes are what compilers
-// make worst: GCC 12 moves each mask of AVX-512 to a general register and back. Included by kernels.inl.
+// Which of the texels of a group are something, and which keys of pixels side by side lie before others: a bit each.
+// Loops that make one number of many lanes are what compilers make worst: GCC 12 moves each mask of AVX-512 to a general
+// register and back. Included by kernels.inl.
 constexpr uint32_t kWholeGroup = (1u << kTexelGroup) - 1u;
 
 #if defined(__AVX512F__)
@@ -140,3 +141,141 @@ template <typename Use>
         groups &= ~0u << (first + count);
     }
 }
+
+/// Writes `first` + k for each k < lanes (1 to 8) whose key is no less than `least`, closed up, and says how many they
+/// are; all eight of `to` may be written. (Reads what other threads may be writing: either is right.)
+#if defined(__AVX512VL__) && !defined(__SANITIZE_THREAD__)
+[[gnu::always_inline]] inline uint32_t keepFrom(const uint64_t* keys, uint32_t lanes, uint64_t least, uint32_t first,
+                                                uint32_t* to) {
+    const __mmask8 there = static_cast<__mmask8>(0xffu >> (8u - lanes));
+    const __m512i read = _mm512_maskz_loadu_epi64(there, keys);
+    const __mmask8 kept = _mm512_mask_cmpge_epu64_mask(there, read, _mm512_set1_epi64(static_cast<long long>(least)));
+    const __m256i all = _mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(first)),
+                                         _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_maskz_compress_epi32(kept, all));
+    return static_cast<uint32_t>(__builtin_popcount(kept));
+}
+#else
+[[gnu::always_inline]] inline uint32_t keepFrom(const uint64_t* keys, uint32_t lanes, uint64_t least, uint32_t first,
+                                                uint32_t* to) {
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < lanes; ++k) {
+        to[count] = first + k;
+        count += __atomic_load_n(keys + k, __ATOMIC_RELAXED) >= least ? 1u : 0u;
+    }
+    return count;
+}
+#endif
+
+/// A depth, as bits: nothing is there. No depth of a surface has them.
+constexpr uint32_t kPassedBy = ~0u;
+
+/// Which of up to 16 depths side by side lie before what their pixels show: a bit each.
+#if defined(__AVX512VL__) && !defined(__SANITIZE_THREAD__)
+[[gnu::always_inline]] inline uint32_t inFront(const uint64_t* keys, uint32_t lanes, const uint32_t* depth,
+                                               uint64_t id) {
+    uint32_t bits = 0;
+    for (uint32_t first = 0; first < lanes; first += 8) {
+        const uint32_t some = lanes - first < 8 ? lanes - first : 8;
+        const __m256i d = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(depth + first));
+        const auto there = static_cast<__mmask8>(
+            (0xffu >> (8u - some)) & _mm256_cmpneq_epi32_mask(d, _mm256_set1_epi32(static_cast<int>(kPassedBy))));
+        const __m512i key = _mm512_or_si512(_mm512_maskz_slli_epi64(0xff, _mm512_maskz_cvtepu32_epi64(0xff, d), 33),
+                                            _mm512_set1_epi64(static_cast<long long>(id)));
+        const __m512i read = _mm512_maskz_loadu_epi64(there, keys + first);
+        bits |= uint32_t{_mm512_mask_cmplt_epu64_mask(there, key, read)} << first;
+    }
+    return bits;
+}
+#elif defined(__AVX2__) && !defined(__SANITIZE_THREAD__)
+[[gnu::always_inline]] inline uint32_t inFront(const uint64_t* keys, uint32_t lanes, const uint32_t* depth,
+                                               uint64_t id) {
+    // (Compared as signed numbers: the upper bit is turned.)
+    const __m256i upper = _mm256_set1_epi64x(static_cast<long long>(uint64_t{1} << 63)),
+                  ids = _mm256_xor_si256(_mm256_set1_epi64x(static_cast<long long>(id)), upper),
+                  places = _mm256_setr_epi64x(0, 1, 2, 3);
+    uint32_t bits = 0;
+    for (uint32_t first = 0; first < lanes; first += 4) {
+        const __m128i d = _mm_loadu_si128(reinterpret_cast<const __m128i*>(depth + first));
+        const __m256i isSome = _mm256_andnot_si256(
+            _mm256_cvtepi32_epi64(_mm_cmpeq_epi32(d, _mm_set1_epi32(static_cast<int>(kPassedBy)))),
+            _mm256_cmpgt_epi64(_mm256_set1_epi64x(static_cast<long long>(lanes - first)), places));
+        if (_mm256_testz_si256(isSome, isSome) != 0) continue;
+        const __m256i key = _mm256_xor_si256(_mm256_slli_epi64(_mm256_cvtepu32_epi64(d), 33), ids);
+        const __m256i read = _mm256_maskload_epi64(reinterpret_cast<const long long*>(keys + first), isSome);
+        const __m256i isBefore =
+            _mm256_and_si256(_mm256_cmpgt_epi64(_mm256_xor_si256(read, upper), key), isSome);
+        bits |= static_cast<uint32_t>(_mm256_movemask_pd(_mm256_castsi256_pd(isBefore))) << first;
+    }
+    return bits;
+}
+#else
+[[gnu::always_inline]] inline uint32_t inFront(const uint64_t* keys, uint32_t lanes, const uint32_t* depth,
+                                               uint64_t id) {
+    uint32_t bits = 0;
+    for (uint32_t k = 0; k < lanes; ++k) {
+        const bool isBefore = visibilityKey(depth[k], id) < __atomic_load_n(keys + k, __ATOMIC_RELAXED);
+        bits |= (depth[k] != kPassedBy && isBefore ? 1u : 0u) << k;
+    }
+    return bits;
+}
+#endif
+
+/// Which records claim a pixel is as good as random: they are closed up without branches.
+#if defined(__AVX512F__)
+void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
+    const __m512i wide = _mm512_set1_epi32(static_cast<int>(kWidePixel));
+    __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < count; i += 16) {
+        const auto there = static_cast<__mmask16>(count - i < 16 ? (1u << (count - i)) - 1u : 0xffffu);
+        const __m512i pixel = _mm512_load_si512(block.pixel + i);
+        const __mmask16 claims = _mm512_mask_cmplt_epu32_mask(there, pixel, wide);
+        _mm512_storeu_si512(to.pixel + n, _mm512_maskz_compress_epi32(claims, pixel));
+        _mm512_storeu_si512(to.depth + n, _mm512_maskz_compress_epi32(claims, _mm512_load_si512(block.depth + i)));
+        _mm512_storeu_si512(to.lane + n, _mm512_maskz_compress_epi32(claims, lanes));
+        lanes = _mm512_maskz_add_epi32(0xffff, lanes, _mm512_set1_epi32(16));
+        n += static_cast<uint32_t>(__builtin_popcount(claims));
+    }
+    to.count = n;
+    for (uint32_t k = 0; k < Claims::kAhead; ++k) to.pixel[n + k] = to.pixel[0];
+}
+#elif defined(__AVX2__) && defined(__BMI2__)
+void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
+    const auto load = [](const uint32_t* v) { return _mm256_load_si256(reinterpret_cast<const __m256i*>(v)); };
+    __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < count; i += 8) {
+        const uint32_t there = count - i < 8 ? (1u << (count - i)) - 1u : 0xffu;
+        const __m256i pixel = load(block.pixel + i);
+        // (What is no pixel has the upper bit.)
+        const uint32_t claims = ~static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(pixel))) & there;
+        // The places of those that do, a byte each, closed up.
+        const uint64_t bytes = _pdep_u64(claims, 0x0101010101010101u) * 0xffu;
+        const __m256i from = _mm256_cvtepu8_epi32(
+            _mm_cvtsi64_si128(static_cast<long long>(_pext_u64(0x0706050403020100u, bytes))));
+        const auto store = [&](uint32_t* v, __m256i all) {
+            _mm256_storeu_si256(reinterpret_cast<__m256i*>(v + n), _mm256_permutevar8x32_epi32(all, from));
+        };
+        store(to.pixel, pixel);
+        store(to.depth, load(block.depth + i));
+        store(to.lane, lanes);
+        lanes = _mm256_add_epi32(lanes, _mm256_set1_epi32(8));
+        n += static_cast<uint32_t>(__builtin_popcount(claims));
+    }
+    to.count = n;
+    for (uint32_t k = 0; k < Claims::kAhead; ++k) to.pixel[n + k] = to.pixel[0];
+}
+#else
+void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        to.pixel[n] = block.pixel[i];
+        to.depth[n] = block.depth[i];
+        to.lane[n] = i;
+        n += block.pixel[i] < kWidePixel ? 1u : 0u;
+    }
+    to.count = n;
+    for (uint32_t k = 0; k < Claims::kAhead; ++k) to.pixel[n + k] = to.pixel[0];
+}
+#endif

@@ -35,10 +35,6 @@ struct Fixed {
     }
 }
 
-[[gnu::always_inline]] inline void offer(const Visibility& visibility, size_t pixel, float linear, uint64_t id) {
-    offerKey(visibility, pixel, visibilityKey(floatBitsToUint(depthOfLinear(lensHere(1.0f), linear)), id));
-}
-
 /// Pixels of a row of a triangle with an alpha mask that are in front, before it is known whether they are cut out.
 struct MaskedRow {
     uint32_t count = 0;
@@ -49,62 +45,104 @@ struct MaskedRow {
     uint64_t key[kTile];
 };
 
-/// Pixels [fromX, toX] x [fromY, toY] of a triangle. `Int`: holds twice the area of the triangle and the box. `mask`:
-/// says which pixels of a row are there (MaskedRow::isKept); KeepAll: all.
-template <typename Int, typename Mask>
-[[gnu::always_inline]] inline void fill(const Fixed& t, int fromX, int toX, int fromY, int toY, uint32_t stride,
-                                        const Visibility& visibility, const Mask& mask) {
+constexpr int64_t kSmallSteps = 40 * 256;           ///< triangles up to this wide are filled in 32 bits
+constexpr int64_t kLargePixels = int64_t{1} << 14;  ///< from this many pixels on a triangle is shared out by rows
+
+/// What of a triangle's box is filled, px, and whether 32 bits are enough for it.
+struct FillBox {
+    int fromX, toX, fromY, toY;
+    bool isSmall;
+};
+[[gnu::always_inline]] inline FillBox fillBox(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow) {
+    const auto least = [](const int64_t* v) {
+        return v[0] < v[1] ? (v[0] < v[2] ? v[0] : v[2]) : (v[1] < v[2] ? v[1] : v[2]);
+    };
+    const auto most = [](const int64_t* v) {
+        return v[0] > v[1] ? (v[0] > v[2] ? v[0] : v[2]) : (v[1] > v[2] ? v[1] : v[2]);
+    };
+    const int64_t minX = least(t.x), maxX = most(t.x), minY = least(t.y), maxY = most(t.y);
+    // First and last pixel whose centre lies in the box.
+    FillBox box;
+    box.fromX = static_cast<int>((minX + 127) >> 8 < 0 ? 0 : (minX + 127) >> 8);
+    box.toX = static_cast<int>((maxX - 128) >> 8 >= f.width ? f.width - 1 : (maxX - 128) >> 8);
+    const int fromY = static_cast<int>((minY + 127) >> 8), toY = static_cast<int>((maxY - 128) >> 8);
+    box.fromY = fromY < firstRow ? firstRow : fromY;
+    box.toY = toY > lastRow ? lastRow : toY;
+    box.isSmall = maxX - minX < kSmallSteps && maxY - minY < kSmallSteps;
+    return box;
+}
+
+/// What a triangle's pixels need. `Number`: holds twice the area of the triangle and the box that is filled, as a whole
+/// number: 32 bits, or a double, which has room for all within the guard (2^51) and, other than 64 bits, SIMD everywhere.
+template <typename Number>
+struct TriangleEdges {
+    Number dx[3], dy[3], row[3];  ///< edge e lies opposite corner e; `row`: at the first pixel of a row
+    float z[3], moved;         ///< what a depth is made of, and what of it the fill rule has moved
+
+    /// imageLinear of a pixel with these edges.
+    [[gnu::always_inline]] float linearAt(Number w0, Number w1, Number w2) const {
+        const float z0 = z[0], z1 = z[1], z2 = z[2];
+        return static_cast<float>(w0) * z0 + static_cast<float>(w1) * z1 + static_cast<float>(w2) * z2 + moved;
+    }
+};
+template <typename Number>
+[[gnu::always_inline]] inline TriangleEdges<Number> edgesOf(const Fixed& t, int fromX, int fromY) {
     constexpr int kOne = 256, kHalf = 128;  // kSubpixel
     const int64_t cx = int64_t{fromX} * kOne + kHalf, cy = int64_t{fromY} * kOne + kHalf;
-    Int dx[3], dy[3], row[3];
-    bool isMoved[3];               // by the fill rule, which decides on coverage only: depth takes that 1 back
-    for (int e = 0; e < 3; ++e) {  // edge e lies opposite corner e
+    TriangleEdges<Number> of;
+    bool isMoved[3];  // by the fill rule, which decides on coverage only: depth takes that 1 back
+    for (int e = 0; e < 3; ++e) {
         const int a = (e + 1) % 3, b = (e + 2) % 3;
         const int64_t ex = t.x[b] - t.x[a], ey = t.y[b] - t.y[a];
-        dx[e] = static_cast<Int>(-ey * kOne);
-        dy[e] = static_cast<Int>(ex * kOne);
+        of.dx[e] = static_cast<Number>(-ey * kOne);
+        of.dy[e] = static_cast<Number>(ex * kOne);
         const int64_t at = ex * (cy - t.y[a]) - ey * (cx - t.x[a]);
         isMoved[e] = !isTopLeft(static_cast<int>(ex), static_cast<int>(ey));
-        row[e] = static_cast<Int>(at - (isMoved[e] ? 1 : 0));
+        of.row[e] = static_cast<Number>(at - (isMoved[e] ? 1 : 0));
     }
     const int64_t area = (t.x[1] - t.x[0]) * (t.y[2] - t.y[0]) - (t.y[1] - t.y[0]) * (t.x[2] - t.x[0]);
     const float inverseArea = 1.0f / static_cast<float>(area);
-    const float z0 = t.inverseDepth[0] * inverseArea, z1 = t.inverseDepth[1] * inverseArea,
-                z2 = t.inverseDepth[2] * inverseArea;
-    const float moved = (isMoved[0] ? z0 : 0.0f) + (isMoved[1] ? z1 : 0.0f) + (isMoved[2] ? z2 : 0.0f);
-    MaskedRow masked;
-    const auto offerMasked = [&](int y) {
-        if (masked.count == 0) return;
-        mask(y, masked);
-        for (uint32_t i = 0; i < masked.count; ++i)
-            if (masked.isKept[i] != 0u)
-                offerKey(visibility, static_cast<size_t>(y) * stride + static_cast<size_t>(masked.x[i]), masked.key[i]);
-        masked.count = 0;
-    };
-    for (int y = fromY; y <= toY; ++y) {
-        Int w0 = row[0], w1 = row[1], w2 = row[2];
-        for (int x = fromX; x <= toX; ++x) {
-            if ((w0 | w1 | w2) >= 0) {
-                const size_t pixel = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
-                const float linear =
-                    static_cast<float>(w0) * z0 + static_cast<float>(w1) * z1 + static_cast<float>(w2) * z2 + moved;
-                const uint64_t key = visibilityKey(floatBitsToUint(depthOfLinear(lensHere(1.0f), linear)), t.id);
-                if (Mask::kKeepsAll) {
-                    offerKey(visibility, pixel, key);
-                } else if (key < __atomic_load_n(&visibility.keys[pixel], __ATOMIC_RELAXED)) {
-                    masked.x[masked.count] = x;
-                    masked.key[masked.count++] = key;
-                    if (masked.count == kTile) offerMasked(y);
-                }
+    for (int e = 0; e < 3; ++e) of.z[e] = t.inverseDepth[e] * inverseArea;
+    of.moved = (isMoved[0] ? of.z[0] : 0.0f) + (isMoved[1] ? of.z[1] : 0.0f) + (isMoved[2] ? of.z[2] : 0.0f);
+    return of;
+}
+
+template <typename Number>
+[[gnu::always_inline]] inline bool covers(Number w0, Number w1, Number w2) {
+    const Number least = w0 < w1 ? w0 : w1;
+    return (least < w2 ? least : w2) >= 0;
+}
+
+/// Pixels of a triangle in a box, kGroup of a row at once.
+template <typename Number, int kGroup>
+[[gnu::always_inline]] inline void fill(const Fixed& t, const FillBox& box, uint32_t stride,
+                                        const Visibility& visibility) {
+    const int fromX = box.fromX, toX = box.toX, toY = box.toY;
+    TriangleEdges<Number> of = edgesOf<Number>(t, fromX, box.fromY);
+    const Number dx0 = of.dx[0], dx1 = of.dx[1], dx2 = of.dx[2];
+    for (int y = box.fromY; y <= toY; ++y) {
+        Number row0 = of.row[0], row1 = of.row[1], row2 = of.row[2];
+        if (y < toY)  // the next row is a picture's width away
+            __builtin_prefetch(visibility.keys + static_cast<size_t>(y + 1) * stride + static_cast<size_t>(fromX), 1);
+        for (int x0 = fromX; x0 <= toX; x0 += kGroup) {
+            alignas(64) uint32_t depth[kGroup];
+#pragma GCC ivdep
+            for (size_t k = 0; k < kGroup; ++k) {
+                const Number w0 = row0 + Number(k) * dx0, w1 = row1 + Number(k) * dx1, w2 = row2 + Number(k) * dx2;
+                const float linear = of.linearAt(w0, w1, w2);
+                depth[k] = covers(w0, w1, w2) ? floatBitsToUint(depthOfLinear(lensHere(1.0f), linear)) : kPassedBy;
             }
-            w0 += dx[0];
-            w1 += dx[1];
-            w2 += dx[2];
+            const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x0);
+            const uint32_t lanes = uint32_t(toX - x0 + 1 < kGroup ? toX - x0 + 1 : kGroup);
+            for (uint32_t left = inFront(visibility.keys + first, lanes, depth, t.id); left != 0; left &= left - 1) {
+                const auto k = static_cast<uint32_t>(__builtin_ctz(left));
+                offerKey(visibility, first + k, visibilityKey(depth[k], t.id));
+            }
+            row0 += kGroup * dx0;
+            row1 += kGroup * dx1;
+            row2 += kGroup * dx2;
         }
-        if (!Mask::kKeepsAll) offerMasked(y);
-        row[0] += dy[0];
-        row[1] += dy[1];
-        row[2] += dy[2];
+        for (int e = 0; e < 3; ++e) of.row[e] += of.dy[e];
     }
 }
 
@@ -144,42 +182,63 @@ void keepMasked(const FrameConstants& frame, const MaskInput& m, int y, MaskedRo
     for (size_t i = 0; i < n; ++i) row.isKept[i] = alpha[i] >= cutoff ? 1u : 0u;
 }
 
-constexpr int64_t kSmallSteps = 40 * 256;           ///< triangles up to this wide are filled in 32 bits
-constexpr int64_t kLargePixels = int64_t{1} << 14;  ///< from this many pixels on a triangle is shared out by rows
-
-struct KeepAll {
-    static constexpr bool kKeepsAll = true;
-    void operator()(int, MaskedRow&) const {}
-};
-struct KeepMasked {
-    static constexpr bool kKeepsAll = false;
-    const FrameConstants& f;
-    const MaskInput& input;
-    void operator()(int y, MaskedRow& row) const { keepMasked(f, input, y, row); }
-};
+/// Those of a triangle with an alpha mask.
+template <typename Number>
+[[gnu::always_inline]] inline void fillMasked(const FrameConstants& f, const Fixed& t, const FillBox& box,
+                                              const Visibility& visibility, const MaskInput& mask) {
+    TriangleEdges<Number> of = edgesOf<Number>(t, box.fromX, box.fromY);
+    const size_t stride = f.width;
+    MaskedRow masked;
+    const auto offerMasked = [&](int y) {
+        if (masked.count == 0) return;
+        keepMasked(f, mask, y, masked);
+        for (uint32_t i = 0; i < masked.count; ++i)
+            if (masked.isKept[i] != 0u)
+                offerKey(visibility, static_cast<size_t>(y) * stride + static_cast<size_t>(masked.x[i]), masked.key[i]);
+        masked.count = 0;
+    };
+    for (int y = box.fromY; y <= box.toY; ++y) {
+        Number w0 = of.row[0], w1 = of.row[1], w2 = of.row[2];
+        for (int x = box.fromX; x <= box.toX; ++x) {
+            if (covers(w0, w1, w2)) {
+                const size_t pixel = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
+                const float linear = of.linearAt(w0, w1, w2);
+                const uint64_t key = visibilityKey(floatBitsToUint(depthOfLinear(lensHere(1.0f), linear)), t.id);
+                if (key < __atomic_load_n(&visibility.keys[pixel], __ATOMIC_RELAXED)) {
+                    masked.x[masked.count] = x;
+                    masked.key[masked.count++] = key;
+                    if (masked.count == kTile) offerMasked(y);
+                }
+            }
+            w0 += of.dx[0];
+            w1 += of.dx[1];
+            w2 += of.dx[2];
+        }
+        offerMasked(y);
+        for (int e = 0; e < 3; ++e) of.row[e] += of.dy[e];
+    }
+}
 
 /// Rows [firstRow, lastRow] of a triangle.
-template <typename Mask = KeepAll>
-void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, const Visibility& visibility,
-              const Mask& mask = {}) {
-    const auto least = [](const int64_t* v) {
-        return v[0] < v[1] ? (v[0] < v[2] ? v[0] : v[2]) : (v[1] < v[2] ? v[1] : v[2]);
-    };
-    const auto most = [](const int64_t* v) {
-        return v[0] > v[1] ? (v[0] > v[2] ? v[0] : v[2]) : (v[1] > v[2] ? v[1] : v[2]);
-    };
-    const int64_t minX = least(t.x), maxX = most(t.x), minY = least(t.y), maxY = most(t.y);
-    // First and last pixel whose centre lies in the box.
-    const int fromX = static_cast<int>((minX + 127) >> 8 < 0 ? 0 : (minX + 127) >> 8);
-    const int toX = static_cast<int>((maxX - 128) >> 8 >= f.width ? f.width - 1 : (maxX - 128) >> 8);
-    int fromY = static_cast<int>((minY + 127) >> 8), toY = static_cast<int>((maxY - 128) >> 8);
-    fromY = fromY < firstRow ? firstRow : fromY;
-    toY = toY > lastRow ? lastRow : toY;
-    if (fromX > toX || fromY > toY) return;
-    if (maxX - minX < kSmallSteps && maxY - minY < kSmallSteps)
-        fill<int32_t>(t, fromX, toX, fromY, toY, f.width, visibility, mask);
+void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, const Visibility& visibility) {
+    const FillBox box = fillBox(f, t, firstRow, lastRow);
+    if (box.fromX > box.toX || box.fromY > box.toY) return;
+    if (box.isSmall && box.toX - box.fromX < 8)
+        fill<int32_t, 8>(t, box, f.width, visibility);
+    else if (box.isSmall)
+        fill<int32_t, 16>(t, box, f.width, visibility);
     else
-        fill<int64_t>(t, fromX, toX, fromY, toY, f.width, visibility, mask);
+        fill<double, 16>(t, box, f.width, visibility);
+}
+/// The same of one with an alpha mask.
+void fillRowsMasked(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, const Visibility& visibility,
+                    const MaskInput& mask) {
+    const FillBox box = fillBox(f, t, firstRow, lastRow);
+    if (box.fromX > box.toX || box.fromY > box.toY) return;
+    if (box.isSmall)
+        fillMasked<int32_t>(f, t, box, visibility, mask);
+    else
+        fillMasked<double>(f, t, box, visibility, mask);
 }
 
 /// What one triangle needs beside its corners.
@@ -202,7 +261,7 @@ void takeTriangle(const FrameConstants& f, Fixed& t, const Candidate& of, const 
     }
     const int last = static_cast<int>(f.height) - 1;
     if (of.mask != nullptr) {
-        fillRows(f, t, 0, last, visibility, KeepMasked{f, *of.mask});
+        fillRowsMasked(f, t, 0, last, visibility, *of.mask);
     } else if ((area < 0 ? -area : area) > kLargePixels * 65536 * 2) {
         LargeTriangle l{};
         for (int k = 0; k < 3; ++k) {

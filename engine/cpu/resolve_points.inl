@@ -240,40 +240,45 @@ void gatherPlaces(uint32_t n, Gathered& g) {
     }
 }
 
-/// Normals of turned nodes (nodeUnitNormal). Pixels side by side are mostly of one node, whose axes are made once.
+/// Points of turned nodes, closed up: their nodes' axes, and places in the row.
+struct TurnedPoints {
+    alignas(64) float axes[9][kTile];
+    alignas(64) uint32_t normal[kTile], octantMask[kTile], at[kTile + 1];
+    alignas(64) float nx[kTile], ny[kTile], nz[kTile];
+};
+/// Normals of turned nodes (nodeUnitNormal); of others nothing reads them. Far away each pixel is of another node.
 void turnNormals(uint32_t n, Gathered& g) {
-    alignas(64) float m[9][kTile], scale[kTile], bent[kTile];
-    const DrawNode* last = nullptr;
-    NormalAxes axes{};
-    for (size_t i = 0; i < n; ++i) {
-        const DrawNode* const node = g.turned[i] > 0.5f ? g.node[i] : nullptr;
-        if (node != nullptr && node != last) {
-            axes = normalAxes(*node);
-            last = node;
-        }
-        m[0][i] = axes.x.x;
-        m[1][i] = axes.x.y;
-        m[2][i] = axes.x.z;
-        m[3][i] = axes.y.x;
-        m[4][i] = axes.y.y;
-        m[5][i] = axes.y.z;
-        m[6][i] = axes.z.x;
-        m[7][i] = axes.z.y;
-        m[8][i] = axes.z.z;
-        scale[i] = axes.scale;
-        bent[i] = node != nullptr && (node->octantMask & kNodeBent) != 0u ? 1.0f : 0.0f;
+    TurnedPoints t;
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < n; ++i) {
+        t.at[count] = i;
+        count += g.turned[i] > 0.5f ? 1u : 0u;
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        const DrawNode& node = *g.node[t.at[k]];
+        const float* const axes = &node.axisX.x;
+        for (size_t a = 0; a < 9; ++a) t.axes[a][k] = axes[a];
+        t.octantMask[k] = node.octantMask;
+        t.normal[k] = g.normal[t.at[k]];
     }
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
-        const vec3 d = octDecode(g.normal[i]);
-        const vec3 t = vec3((m[0][i] * d.x + m[3][i] * d.y + m[6][i] * d.z) * scale[i],
-                            (m[1][i] * d.x + m[4][i] * d.y + m[7][i] * d.z) * scale[i],
-                            (m[2][i] * d.x + m[5][i] * d.y + m[8][i] * d.z) * scale[i]);
-        const bool isBent = bent[i] > 0.5f;
-        const float shorten = 1.0f / std::sqrt(max(t.x * t.x + t.y * t.y + t.z * t.z, 1.0e-37f));
-        g.nx[i] = isBent ? t.x * shorten : t.x;
-        g.ny[i] = isBent ? t.y * shorten : t.y;
-        g.nz[i] = isBent ? t.z * shorten : t.z;
+    for (size_t k = 0; k < count; ++k) {
+        DrawNode node{};
+        node.axisX = vec3(t.axes[0][k], t.axes[1][k], t.axes[2][k]);
+        node.axisY = vec3(t.axes[3][k], t.axes[4][k], t.axes[5][k]);
+        node.axisZ = vec3(t.axes[6][k], t.axes[7][k], t.axes[8][k]);
+        node.octantMask = t.octantMask[k];
+        const vec3 turned = nodeNormal(node, octDecode(t.normal[k]));
+        const bool isBent = (node.octantMask & kNodeBent) != 0u;
+        const float shorten = 1.0f / std::sqrt(max(dot(turned, turned), 1.0e-37f));  // (always: no branch)
+        t.nx[k] = isBent ? turned.x * shorten : turned.x;
+        t.ny[k] = isBent ? turned.y * shorten : turned.y;
+        t.nz[k] = isBent ? turned.z * shorten : turned.z;
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        g.nx[t.at[k]] = t.nx[k];
+        g.ny[t.at[k]] = t.ny[k];
+        g.nz[t.at[k]] = t.nz[k];
     }
 }
 

@@ -5,9 +5,9 @@
 
 /// What the weights mix, corner by corner.
 struct Corners {
-    alignas(64) float x[3][kTile], y[3][kTile], z[3][kTile];
-    alignas(64) float u[3][kTile], v[3][kTile];
-    alignas(64) uint32_t normal[3][kTile], colour[3][kTile];
+    alignas(64) float x[3][kTile + kSpread], y[3][kTile + kSpread], z[3][kTile + kSpread];
+    alignas(64) float u[3][kTile + kSpread], v[3][kTile + kSpread];
+    alignas(64) uint32_t normal[3][kTile + kSpread], colour[3][kTile + kSpread];
 };
 
 /// A material's properties at the pixels, and what the shading needs of the surface.
@@ -138,7 +138,7 @@ struct TriangleRow {
     MaterialRow material;
     UvRow uv;
     alignas(64) float wb[kTile], wc[kTile];  ///< weights of the second and third corner
-    alignas(64) uint32_t surface[kTile];     ///< flags and material
+    alignas(64) uint32_t surface[kTile + kSpread];  ///< flags and material
     alignas(64) float perpX[kTile], perpY[kTile];
     alignas(64) uint32_t word[kTile], emission[kTile];
 };
@@ -155,24 +155,29 @@ struct RowRays {
 /// Follows the pointers; is any of them textured?
 [[gnu::always_inline]] inline bool gatherCorners(const ResolveInput& in, const WinningPixels& p, Corners& c,
                                                  uint32_t* __restrict surface) {
-    const size_t n = p.count;
     uint32_t anyTextured = 0;
-    for (size_t i = 0; i < n; ++i) {
-        const MeshBlock& block = in.meshBlocks[p.id[i] / kClusterTriangles];
-        const uint32_t t = block.triangles[p.id[i] % kClusterTriangles];
+    PixelRuns runs;
+    findRuns(p, runs);
+    for (uint32_t r = 0; r < runs.count; ++r) {
+        const size_t first = runs.first[r], end = runs.first[r + 1];
+        const MeshBlock& block = in.meshBlocks[p.id[first] / kClusterTriangles];
+        const uint32_t t = block.triangles[p.id[first] % kClusterTriangles];
+        const uint32_t flags = block.vertices[t & 255u].surface;
         for (uint32_t k = 0; k < 3; ++k) {
             const MeshVertex& v = block.vertices[t >> (8 * k) & 255u];
             const vec3 at = placeOf(block, t >> (8 * k) & 255u);
-            c.x[k][i] = at.x;
-            c.y[k][i] = at.y;
-            c.z[k][i] = at.z;
-            c.normal[k][i] = v.normal;
-            c.colour[k][i] = v.colour;
-            c.u[k][i] = v.u;
-            c.v[k][i] = v.v;
+            for (size_t i = first; i < end; i += kSpread) {
+                spread(at.x, c.x[k] + i);
+                spread(at.y, c.y[k] + i);
+                spread(at.z, c.z[k] + i);
+                spread(v.normal, c.normal[k] + i);
+                spread(v.colour, c.colour[k] + i);
+                spread(v.u, c.u[k] + i);
+                spread(v.v, c.v[k] + i);
+            }
         }
-        surface[i] = block.vertices[t & 255u].surface;
-        anyTextured |= surface[i] & kSurfaceTextured;
+        for (size_t i = first; i < end; i += kSpread) spread(flags, surface + i);
+        anyTextured |= flags & kSurfaceTextured;
     }
     return anyTextured != 0;
 }

@@ -28,7 +28,7 @@ void main() {
             hit = tubePixel(s, ray, frame.nearPlane);
         else
             hit = ribbonPixel(s, ray, frame.nearPlane);
-        if (hit.depth < kNoDepth) t.depth = hit.depth;
+        t.depth = hit.depth < kNoDepth ? hit.depth : keyDepth(key);  // where rounding lets the ray pass by
         t.normalPerp = hit.depth < kNoDepth ? hit.normalPerp : vec2(0.0);
         t.radius = 0.25;
         t.thickness = s.isRound > 0.5 ? 0.25 : kLeafThickness * 0.25;  // a filled ribbon is a leaf

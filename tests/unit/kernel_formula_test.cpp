@@ -204,6 +204,7 @@ TEST(KernelFormulas, NoPixelIsClaimedBesideTheBoxOfItsBlock) {
         Rng rng(12);
         std::vector<PointRecord> records(kRecordsPerBlock);
         cpu::ProjectedBlock block;
+        const auto claims = std::make_unique<cpu::Claims>();
         size_t claimed = 0, wide = 0;
         for (int round = 0; round < 200; ++round) {
             DrawNode node = randomNode(rng);
@@ -211,6 +212,8 @@ TEST(KernelFormulas, NoPixelIsClaimedBesideTheBoxOfItsBlock) {
             for (PointRecord& r : records) r = randomRecord(rng);
             const uint32_t count = round % 3 == 0 ? kRecordsPerBlock : static_cast<uint32_t>(round) % kRecordsPerBlock;
             k.projectBlock(f, node, records.data(), count, true, block);
+            k.findClaims(block, count, *claims);
+            uint32_t found = 0;
             for (uint32_t i = 0; i < count; ++i) {
                 wide += block.pixel[i] == cpu::kWidePixel;
                 if (block.pixel[i] >= cpu::kWidePixel) continue;
@@ -218,7 +221,13 @@ TEST(KernelFormulas, NoPixelIsClaimedBesideTheBoxOfItsBlock) {
                 const int x = static_cast<int>(block.pixel[i] % f.width),
                           y = static_cast<int>(block.pixel[i] / f.width);
                 ASSERT_TRUE(block.firstX <= x && x <= block.lastX && block.firstY <= y && y <= block.lastY);
+                ASSERT_EQ(claims->lane[found], i);
+                ASSERT_EQ(claims->pixel[found], block.pixel[i]);
+                ASSERT_EQ(claims->depth[found++], block.depth[i]);
             }
+            ASSERT_EQ(claims->count, found);
+            for (uint32_t ahead = 0; found > 0 && ahead < cpu::Claims::kAhead; ++ahead)
+                ASSERT_LT(claims->pixel[found + ahead], f.width * f.height) << "is asked for, too";
         }
         EXPECT_GT(claimed, 1'000u);
         EXPECT_GT(wide, 0u);

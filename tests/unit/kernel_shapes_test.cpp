@@ -127,6 +127,7 @@ TEST(KernelFormulas, TexelsOfCurvesAreThoseOfTheFormulas) {
         std::vector<CurveSegment> segments(kSegmentsPerBlock);
         double worst = 0;
         std::array<size_t, 4> seen{};  // lines, filled and met, each of ribbons and tubes
+        size_t passedBy = 0, longRuns = 0;
         for (int round = 0; round < 300; ++round) {
             const DrawNode node = randomNode(rng);
             for (CurveSegment& s : segments) s = randomSegment(rng);
@@ -139,13 +140,19 @@ TEST(KernelFormulas, TexelsOfCurvesAreThoseOfTheFormulas) {
                 uint64_t key = kNoKey;
                 shown.emplace_back();
                 for (uint32_t lane = 0; lane < kSegmentsPerBlock && key == kNoKey; ++lane) {
-                    const uint32_t at = (lane + 37 * i) % kSegmentsPerBlock;
+                    const uint32_t at =
+                        (lane + 37 * (i / (1 + round % 20))) % kSegmentsPerBlock;  // some in a row the same
                     if (!isSeenAt(f, placed(node, segments[at]), x0 + i, y)) continue;
                     shown.back() = segments[at];
                     key = visibilityKey(floatBitsToUint(5.0f), drawId(f.firstBlock.of[kKindCurves], at));
                 }
                 r.keys.push_back(key);
             }
+            for (uint32_t i = 9; i < cpu::kTile; ++i)
+                longRuns += r.keys[i] != kNoKey && std::all_of(&r.keys[i - 9], &r.keys[i],
+                                                               [&](uint64_t key) { return key == r.keys[i]; })
+                                ? 1
+                                : 0;
             const std::vector<uint64_t> keys = r.keys;
             if (std::all_of(keys.begin(), keys.end(), [](uint64_t key) { return key == kNoKey; })) continue;
             const cpu::CurveBlock block{segments.data(), &node};
@@ -157,7 +164,11 @@ TEST(KernelFormulas, TexelsOfCurvesAreThoseOfTheFormulas) {
                 bool isFilledHere = false, isMet = false;
                 const Texel t = texelOf(f, node, shown[i], x0, i, y, isFilledHere, isMet);
                 const size_t at = cpu::kPad + i;
-                if (isFilledHere && !isMet) continue;  // where the ray passes by
+                if (isFilledHere && !isMet) {  // where the ray passes by
+                    worst = std::max(worst, ulpsBetween(r.row->depth[at], keyDepth(keys[i])));
+                    ++passedBy;
+                    continue;
+                }
                 seen.at((isTube(shown[i]) ? 2u : 0u) + (isFilledHere ? 1u : 0u))++;
                 worst = std::max({worst, farthest(*r.row, at, t), ulpsBetween(r.row->isRound[at], t.isRound),
                                   ulpsBetween(r.row->axisX[at], t.axis.x), ulpsBetween(r.row->axisY[at], t.axis.y)});
@@ -165,6 +176,104 @@ TEST(KernelFormulas, TexelsOfCurvesAreThoseOfTheFormulas) {
         }
         EXPECT_EQ(worst, 0) << "the formulas themselves, without fused multiplications";
         for (const size_t n : seen) EXPECT_GT(n, 20u);
+        EXPECT_GT(passedBy, 20u);
+        EXPECT_GT(longRuns, 20u) << "of more than nine pixels";
+    });
+}
+
+/// Segments so wide that they are filled, some of them a hair before others.
+std::vector<CurveSegment> filledSegments(Rng& rng, const FrameConstants& f, const DrawNode& node) {
+    const Lens lens = frameLens(f);
+    std::vector<CurveSegment> segments;
+    while (segments.size() < kSegmentsPerBlock) {
+        CurveSegment s = randomSegment(rng);
+        for (CurveVertex* v : {&s.a, &s.b})
+            v->positionZ = (v->positionZ & 0x8000ffffu) | curveRadiusCode(uniform(rng, 0.001, 0.1)) << 16;
+        const CameraSegment c = placed(node, s);
+        if (isFilled(c, projectSegment(c.a, c.b, lens, f.centre.x, f.centre.y, f.nearPlane), lens, f.exactCurves) <
+            0.5f)
+            continue;
+        segments.push_back(s);
+        if (rng.below(4) != 0 || segments.size() == kSegmentsPerBlock) continue;
+        s.a.positionZ ^= static_cast<uint32_t>(rng.below(4));
+        s.b.positionXY ^= static_cast<uint32_t>(rng.below(4));
+        s.a.positionZ ^= static_cast<uint32_t>(rng.below(2)) << 31;
+        segments.push_back(s);
+    }
+    return segments;
+}
+/// Where the ray of a pixel meets a filled curve, kNoDepth if it does not.
+float filledDepth(const FrameConstants& f, const CameraSegment& s, uint32_t x, uint32_t y) {
+    const PixelRay ray = pixelRay(frameLens(f), (static_cast<float>(x) + 0.5f - f.centre.x) * (1.0f / f.focal),
+                                  (static_cast<float>(y) + 0.5f - f.centre.y) * (1.0f / f.focal));
+    if (s.isRound > 0.5f) {
+        const Tube tube = tubeOf(s.a, s.b, s.radiusA, s.radiusB);
+        return tubeHit(tube, ray, f.nearPlane, isBeforeEye(tube, f.nearPlane) && isShort(tube)).depth;
+    }
+    const Ribbon ribbon = ribbonOf(s.a, s.b, s.directionA, s.directionB, s.radiusA, s.radiusB);
+    return ribbonHit(ribbon, ray, f.nearPlane, kRibbonSlack).depth;
+}
+
+// Whichever rows, columns and pixels behind others were left out: what is left is what every ray on its own meets
+// first.
+TEST(KernelFormulas, PixelsOfFilledCurvesAreThoseOfTheirRays) {
+    forKernels([](const cpu::Kernels& k, const FrameConstants& plain) {
+        FrameConstants f = withRanges(plain);
+        f.width = 190;  // more pixels than the largest curve that one thread fills
+        f.height = 130;
+        f.focal *= f.orthographic != 0 ? 1.0f : 0.25f;
+        f.centre = {94.6f, 65.2f};
+        Rng rng(9);
+        const size_t pixels = size_t{f.width} * f.height;
+        std::vector<uint64_t> keys(pixels);
+        std::vector<uint8_t> runs(pixels / cpu::Visibility::kRun + 1);
+        std::vector<cpu::FilledCurve> wide;
+        const cpu::WideSink sink{&wide, [](void* to, const cpu::FilledCurve& s) {
+                                     static_cast<std::vector<cpu::FilledCurve>*>(to)->push_back(s);
+                                 }};
+        size_t covered = 0, unequal = 0, around = 0, shared = 0;
+        for (int round = 0; round < 4; ++round) {
+            // A cell of length 1 round a place before the eye, at first round the eye itself.
+            DrawNode node = randomNode(rng);
+            vec3 corner = {uniform(rng, -1, 1), uniform(rng, -1, 1), round == 0 ? 0.0f : uniform(rng, 1, 3)};
+            for (vec3* axis : {&node.axisX, &node.axisY, &node.axisZ}) {
+                *axis = stretched(*axis, 1 / node.edge);
+                corner = minus(corner, stretched(*axis, 32768));
+            }
+            node.base = corner;
+            node.edge = 1;
+            const std::vector<CurveSegment> segments = filledSegments(rng, f, node);
+            std::fill(keys.begin(), keys.end(), kNoKey);
+            std::fill(runs.begin(), runs.end(), uint8_t{0});
+            wide.clear();
+            const cpu::Visibility visibility{keys.data(), runs.data()};
+            k.drawSegments(f, {segments.data(), &node}, kSegmentsPerBlock, 512, sink, visibility);
+            k.fillWide(f, wide.data(), wide.size(), 0, f.height - 1, visibility);
+            shared += wide.size();
+            std::vector<CameraSegment> camera;
+            for (const CurveSegment& s : segments) camera.push_back(placed(node, s));
+            for (const CameraSegment& s : camera) around += s.a.z < f.nearPlane || s.b.z < f.nearPlane ? 1 : 0;
+            for (uint32_t y = 0; y < f.height; ++y)
+                for (uint32_t x = 0; x < f.width; ++x) {
+                    uint64_t nearest = kNoKey;
+                    for (uint32_t s = 0; s < kSegmentsPerBlock; ++s) {
+                        const float depth = filledDepth(f, camera[s], x, y);
+                        if (depth < kNoDepth)
+                            nearest = std::min(nearest, visibilityKey(floatBitsToUint(depth),
+                                                                      drawId(f.firstBlock.of[kKindCurves], 512 + s)));
+                    }
+                    const uint64_t key = keys[size_t{y} * f.width + x];
+                    covered += nearest != kNoKey ? 1 : 0;
+                    unequal += key != nearest ? 1 : 0;
+                    if (key != kNoKey) {
+                        EXPECT_EQ(runs[(size_t{y} * f.width + x) >> cpu::Visibility::kRunBits], 1);
+                    }
+                }
+        }
+        EXPECT_GT(covered, 12'000u);
+        EXPECT_GT(around, 20u) << "that reach behind the eye";
+        if (f.orthographic == 0) EXPECT_GT(shared, 0u) << "that are left to all threads";
+        EXPECT_EQ(unequal, 0u) << "of " << covered;
     });
 }
 

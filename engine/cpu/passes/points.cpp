@@ -36,30 +36,13 @@ void findWide(const Frame& frame, uint32_t b, uint32_t count, const ProjectedBlo
     }
 }
 
-constexpr uint32_t kAhead =
-    48;  // pixels are scattered over 16 MB: so many records before they are read they are asked for
-/// The records of a block that claim a pixel. (Plain arrays: of std::array's references GCC makes branches.)
-struct Claims {
-    uint32_t count = 0;
-    alignas(64) uint32_t of[ProjectedBlock::kSize + kAhead];
-};
-/// Which do is as good as random: they are found without branches.
-void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
-    uint32_t n = 0;
-    for (uint32_t i = 0; i < count; ++i) {
-        to.of[n] = i;
-        n += block.pixel[i] < kWidePixel ? 1u : 0u;
-    }
-    for (uint32_t k = 0; n > 0 && k < kAhead; ++k) to.of[n + k] = to.of[0];
-    to.count = n;
-}
 /// The nearest of each pixel stays. Which is in front is as good as random, too: a branch that is guessed wrongly would
 /// wait for the pixel. So stores are plain, and the pixels have to be this thread's own (PixelRegions).
-void claimPixels(const ProjectedBlock& block, uint32_t b, const Claims& claims, const Visibility& to) {
+void claimPixels(uint64_t firstId, const Claims& claims, const Visibility& to) {
     for (uint32_t k = 0; k < claims.count; ++k) {
-        const uint32_t i = claims.of[k], pixel = block.pixel[i];
-        __builtin_prefetch(&to.keys[block.pixel[claims.of[k + kAhead]]], 1);
-        const uint64_t key = shared::visibilityKey(block.depth[i], shared::drawId(b, i)), old = to.keys[pixel];
+        const uint32_t pixel = claims.pixel[k];
+        __builtin_prefetch(&to.keys[claims.pixel[k + Claims::kAhead]], 1);
+        const uint64_t key = shared::visibilityKey(claims.depth[k], firstId + claims.lane[k]), old = to.keys[pixel];
         to.keys[pixel] = key < old ? key : old;
         const std::atomic_ref<uint8_t> run(to.runs[pixel >> Visibility::kRunBits]);  // of several regions
         if (run.load(std::memory_order_relaxed) == 0) run.store(1, std::memory_order_relaxed);
@@ -93,10 +76,10 @@ void projectBlocks(Frame& frame, std::span<const uint32_t> blocks, const std::ve
                                  besideToo[frame.draws->points().blocks[b].node] != 0, block);
             if ((node.octantMask & shared::kNodeWide) != 0) findWide(frame, b, count, block, mine);
             if (k + 1 < end) askForRecords(frame.blocks[blocks[k + 1]], countOf(frame, blocks[k + 1]));
-            findClaims(block, count, claims);
+            frame.k.findClaims(block, count, claims);
             if (claims.count == 0) continue;
             const PixelRegions::Held held(frame.regions, block.firstX, block.lastX, block.firstY, block.lastY);
-            claimPixels(block, b, claims, frame.visible());
+            claimPixels(shared::drawId(b, 0), claims, frame.visible());
         }
         if (!mine.empty()) found.push(std::move(mine));
     });
@@ -130,15 +113,16 @@ void fillDiscs(Frame& frame) {
 void findBlocks(Frame& frame) {
     const render::DrawBatch& points = frame.draws->points();
     frame.blocks.resize(points.blocks.size());
+    const lod::Chunk* chunk = nullptr;  // blocks of a node lie side by side
     for (size_t b = 0; b < frame.blocks.size(); ++b) {
         const shared::DrawBlock& block = points.blocks[b];
-        const lod::Chunk& chunk = frame.chunks.at(points.keys[block.node]);
+        if (b == 0 || block.node != points.blocks[b - 1].node) chunk = &frame.chunks.at(points.keys[block.node]);
         const shared::DrawNode& node = points.nodes[block.node];
         const bool hasOwn =
-            node.materials > 0 && (node.material & shared::kOnlyMaterial) == 0 && !chunk.materials.empty();
-        frame.blocks[b] = {chunk.records.data() + block.first, &node,
-                           chunk.weights.empty() ? nullptr : chunk.weights.data() + block.first,
-                           hasOwn ? chunk.materials.data() + block.first : nullptr};
+            node.materials > 0 && (node.material & shared::kOnlyMaterial) == 0 && !chunk->materials.empty();
+        frame.blocks[b] = {chunk->records.data() + block.first, &node,
+                           chunk->weights.empty() ? nullptr : chunk->weights.data() + block.first,
+                           hasOwn ? chunk->materials.data() + block.first : nullptr};
     }
 }
 
