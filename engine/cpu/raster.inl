@@ -124,7 +124,10 @@ template <typename Number, int kGroup>
         Number row0 = of.row[0], row1 = of.row[1], row2 = of.row[2];
         if (y < toY)  // the next row is a picture's width away
             __builtin_prefetch(visibility.keys + static_cast<size_t>(y + 1) * stride + static_cast<size_t>(fromX), 1);
-        for (int x0 = fromX; x0 <= toX; x0 += kGroup) {
+        for (int x0 = fromX; x0 <= toX; x0 += kGroup, row0 += kGroup * dx0, row1 += kGroup * dx1, row2 += kGroup * dx2) {
+            // Edges are straight: both ends beyond one, all are.
+            const auto isBeside = [](Number w, Number dx) { return w < 0 && w + (kGroup - 1) * dx < 0; };
+            if (isBeside(row0, dx0) || isBeside(row1, dx1) || isBeside(row2, dx2)) continue;
             alignas(64) uint32_t depth[kGroup];
 #pragma GCC ivdep
             for (size_t k = 0; k < kGroup; ++k) {
@@ -138,9 +141,6 @@ template <typename Number, int kGroup>
                 const auto k = static_cast<uint32_t>(__builtin_ctz(left));
                 offerKey(visibility, first + k, visibilityKey(depth[k], t.id));
             }
-            row0 += kGroup * dx0;
-            row1 += kGroup * dx1;
-            row2 += kGroup * dx2;
         }
         for (int e = 0; e < 3; ++e) of.row[e] += of.dy[e];
     }
