@@ -24,7 +24,8 @@ struct List {
         items.at(count++) = &kernels_sse;
 #endif
 #if defined(STIPPLE_HAS_AVX2)
-        if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) items.at(count++) = &kernels_avx2;
+        if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2"))
+            items.at(count++) = &kernels_avx2;
 #endif
 #if defined(STIPPLE_HAS_AVX512)
         if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&

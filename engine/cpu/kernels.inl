@@ -1,7 +1,7 @@
 // Included once per instruction set and kind of view, with STIPPLE_KERNELS naming the table and STIPPLE_ORTHOGRAPHIC
 // saying whether its views are orthographic (lens.h): what asks for that costs nothing. No header with functions of its
-// own may be included here except shaders/shared, whose functions are static, and intrinsics, which are always inlined: the
-// linker must not mix instruction sets.
+// own may be included here except shaders/shared, whose functions are static, and intrinsics, which are always inlined:
+// the linker must not mix instruction sets.
 #include <cmath>
 #if defined(__SSE4_1__)
 #include <immintrin.h>
@@ -216,8 +216,9 @@ template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline void packTexels(const TexelRow& __restrict row, size_t first, size_t last,
                                               const Planes& planes) {
     float* __restrict const depth = planes.depth;
-    uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset, *__restrict const normal = planes.normal,
-             *__restrict const colour = planes.colour, *__restrict const surface = planes.surface;
+    uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset,
+             *__restrict const normal = planes.normal, *__restrict const colour = planes.colour,
+             *__restrict const surface = planes.surface;
 #pragma GCC ivdep
     for (size_t i = first; i < last; ++i) {
         const Texel t = texelAt<hasTubes, hasMaterials>(row, kPad + i);

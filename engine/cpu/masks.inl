@@ -1,6 +1,6 @@
 // Which of the texels of a group are something, and which keys of pixels side by side lie before others: a bit each.
-// Loops that make one number of many lanes are what compilers make worst: GCC 12 moves each mask of AVX-512 to a general
-// register and back. Included by kernels.inl.
+// Loops that make one number of many lanes are what compilers make worst: GCC 12 moves each mask of AVX-512 to a
+// general register and back. Included by kernels.inl.
 constexpr uint32_t kWholeGroup = (1u << kTexelGroup) - 1u;
 
 #if defined(__AVX512F__)
@@ -142,6 +142,25 @@ template <typename Use>
     }
 }
 
+#if defined(__AVX2__) && !defined(__AVX512F__)
+/// Of each set of eight lanes the numbers of those that are in it, a byte each, closed up. (BMI2 has instructions for
+/// that, which take hundreds of cycles before Zen 3.)
+struct ClosedUp {
+    uint64_t of[256] = {};
+    constexpr ClosedUp() {
+        for (uint32_t set = 0; set < 256; ++set)
+            for (uint32_t lane = 0, count = 0; lane < 8; ++lane)
+                if ((set >> lane & 1u) != 0u) of[set] |= uint64_t{lane} << 8u * count++;
+    }
+};
+constexpr ClosedUp kClosedUp;
+/// Writes eight lanes, first those of the set.
+[[gnu::always_inline]] inline void storeClosedUp(__m256i all, uint32_t set, uint32_t* to) {
+    const __m256i from = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kClosedUp.of[set])));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, from));
+}
+#endif
+
 /// Writes `first` + k for each k < lanes (1 to 8) whose key is no less than `least`, closed up, and says how many they
 /// are; all eight of `to` may be written. (Reads what other threads may be writing: either is right.)
 #if defined(__AVX512VL__) && !defined(__SANITIZE_THREAD__)
@@ -153,6 +172,25 @@ template <typename Use>
     const __m256i all = _mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(first)),
                                          _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_maskz_compress_epi32(kept, all));
+    return static_cast<uint32_t>(__builtin_popcount(kept));
+}
+#elif defined(__AVX2__) && !defined(__SANITIZE_THREAD__)
+[[gnu::always_inline]] inline uint32_t keepFrom(const uint64_t* keys, uint32_t lanes, uint64_t least, uint32_t first,
+                                                uint32_t* to) {
+    // (Compared as signed numbers: the upper bit is turned.)
+    const __m256i upper = _mm256_set1_epi64x(static_cast<long long>(uint64_t{1} << 63)),
+                  from = _mm256_xor_si256(_mm256_set1_epi64x(static_cast<long long>(least)), upper);
+    uint32_t kept = 0;
+    for (uint32_t k = 0; k < lanes; k += 4) {
+        const __m256i there = _mm256_cmpgt_epi64(_mm256_set1_epi64x(static_cast<long long>(lanes - k)),
+                                                 _mm256_setr_epi64x(0, 1, 2, 3));
+        const __m256i read = _mm256_maskload_epi64(reinterpret_cast<const long long*>(keys + k), there);
+        const __m256i isKept = _mm256_andnot_si256(_mm256_cmpgt_epi64(from, _mm256_xor_si256(read, upper)), there);
+        kept |= static_cast<uint32_t>(_mm256_movemask_pd(_mm256_castsi256_pd(isKept))) << k;
+    }
+    const __m256i numbers = _mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(first)),
+                                             _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+    storeClosedUp(numbers, kept, to);
     return static_cast<uint32_t>(__builtin_popcount(kept));
 }
 #else
@@ -240,7 +278,7 @@ void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
     to.count = n;
     for (uint32_t k = 0; k < Claims::kAhead; ++k) to.pixel[n + k] = to.pixel[0];
 }
-#elif defined(__AVX2__) && defined(__BMI2__)
+#elif defined(__AVX2__)
 void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
     const auto load = [](const uint32_t* v) { return _mm256_load_si256(reinterpret_cast<const __m256i*>(v)); };
     __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
@@ -250,16 +288,9 @@ void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
         const __m256i pixel = load(block.pixel + i);
         // (What is no pixel has the upper bit.)
         const uint32_t claims = ~static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(pixel))) & there;
-        // The places of those that do, a byte each, closed up.
-        const uint64_t bytes = _pdep_u64(claims, 0x0101010101010101u) * 0xffu;
-        const __m256i from = _mm256_cvtepu8_epi32(
-            _mm_cvtsi64_si128(static_cast<long long>(_pext_u64(0x0706050403020100u, bytes))));
-        const auto store = [&](uint32_t* v, __m256i all) {
-            _mm256_storeu_si256(reinterpret_cast<__m256i*>(v + n), _mm256_permutevar8x32_epi32(all, from));
-        };
-        store(to.pixel, pixel);
-        store(to.depth, load(block.depth + i));
-        store(to.lane, lanes);
+        storeClosedUp(pixel, claims, to.pixel + n);
+        storeClosedUp(load(block.depth + i), claims, to.depth + n);
+        storeClosedUp(lanes, claims, to.lane + n);
         lanes = _mm256_add_epi32(lanes, _mm256_set1_epi32(8));
         n += static_cast<uint32_t>(__builtin_popcount(claims));
     }

@@ -73,7 +73,8 @@ struct FillBox {
 }
 
 /// What a triangle's pixels need. `Number`: holds twice the area of the triangle and the box that is filled, as a whole
-/// number: 32 bits, or a double, which has room for all within the guard (2^51) and, other than 64 bits, SIMD everywhere.
+/// number: 32 bits, or a double, which has room for all that clipTriangle leaves and, other than 64 bits, SIMD
+/// everywhere.
 template <typename Number>
 struct TriangleEdges {
     Number dx[3], dy[3], row[3];  ///< edge e lies opposite corner e; `row`: at the first pixel of a row
@@ -124,7 +125,8 @@ template <typename Number, int kGroup>
         Number row0 = of.row[0], row1 = of.row[1], row2 = of.row[2];
         if (y < toY)  // the next row is a picture's width away
             __builtin_prefetch(visibility.keys + static_cast<size_t>(y + 1) * stride + static_cast<size_t>(fromX), 1);
-        for (int x0 = fromX; x0 <= toX; x0 += kGroup, row0 += kGroup * dx0, row1 += kGroup * dx1, row2 += kGroup * dx2) {
+        for (int x0 = fromX; x0 <= toX;
+             x0 += kGroup, row0 += kGroup * dx0, row1 += kGroup * dx1, row2 += kGroup * dx2) {
             // Edges are straight: both ends beyond one, all are.
             const auto isBeside = [](Number w, Number dx) { return w < 0 && w + (kGroup - 1) * dx < 0; };
             if (isBeside(row0, dx0) || isBeside(row1, dx1) || isBeside(row2, dx2)) continue;

@@ -246,7 +246,8 @@ struct TurnedPoints {
     alignas(64) uint32_t normal[kTile], octantMask[kTile], at[kTile + 1];
     alignas(64) float nx[kTile], ny[kTile], nz[kTile];
 };
-/// Normals of turned nodes (nodeUnitNormal); of others nothing reads them. Far away each pixel is of another node.
+/// Normals of turned nodes (nodeUnitNormal); of others they are left as they are, and not taken (gatheredNormal). Far
+/// away each pixel is of another node.
 void turnNormals(uint32_t n, Gathered& g) {
     TurnedPoints t;
     uint32_t count = 0;

@@ -83,8 +83,8 @@ void placeRibbons(const FrameConstants& frame, const DrawNode& drawNode, const u
     }
 }
 
-/// Fills those of a batch, or, of one that covers much of the image, leaves it to all threads. Of all of them where rows
-/// begin is asked for before the pixels of the first are read.
+/// Fills those of a batch, or, of one that covers much of the image, leaves it to all threads. Of all of them where
+/// rows begin is asked for before the pixels of the first are read.
 void fillBatch(const FrameConstants& frame, const DrawNode& node, const uint32_t* words, uint64_t firstId,
                const WideSink& wide, const Visibility& visibility, RibbonBatch& batch) {
     const FrameConstants f = frame;

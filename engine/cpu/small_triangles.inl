@@ -61,7 +61,7 @@ SmallBoxes findSmallBoxes(const FrameConstants& f, SmallTriangles& __restrict t)
     return {mostX + 1, mostY + 1, anyLeft != 0};
 }
 
-/// As fill() has them, at the first pixel of each box. Triangles have two sides.
+/// As edgesOf() has them, at the first pixel of each box. Triangles have two sides.
 void findSmallEdges(SmallTriangles& __restrict t) {
 #pragma GCC ivdep
     for (size_t i = 0; i < SmallTriangles::kCount; ++i) {

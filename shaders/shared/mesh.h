@@ -108,7 +108,8 @@ SHARED_FN vec3 meshPositionWide(int x, int y, int z, int highX, int highY, int h
 }
 
 const float kSubpixel = 256.0f;
-// Beyond this many pixels from the image's corner a triangle is clipped, so that 64-bit integers hold every product.
+// Beyond this many pixels from the image's corner a triangle is clipped, so that 64-bit integers and doubles hold every
+// product.
 const float kGuardPixels = 65536.0f;
 // Support of a triangle's pixel, pixels: it reaches nowhere beyond the pixel that it covers.
 const float kTriangleRadius = 0.25f;
