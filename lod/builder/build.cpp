@@ -196,6 +196,9 @@ class PointStages final : public BuildStages {
         return {};
     }
 
+    /// Threads that find no bucket left help with those that others work on (their seconds are not counted), unless the
+    /// memory allows only some of them.
+    Executor& withinBucket() { return course_.workers < course_.executor.threads() ? *serial_ : course_.executor; }
     Result<BuiltBucket> buildBucket(size_t index) {
         const BucketPlan::Bucket& bucket = plan().buckets[index];
         BuiltBucket out;
@@ -219,24 +222,30 @@ class PointStages final : public BuildStages {
             wanted.normals = settings_.normals == NormalsMode::automatic;
             wanted.isFine = settings_.fineNormals;
             wanted.limitStrays = settings_.estimateRadii && !input_.hasRadius;
-            estimate(frame(), spread_->tree(), bucket.firstCell, bucket.cells, wanted, ghosts, sorted.sorted);
+            estimate(frame(), spread_->tree(), bucket.firstCell, bucket.cells, wanted, ghosts, withinBucket(),
+                     sorted.sorted);
         }
         ends("threads: estimate");
         out.ranges = ValueRanges(frame(), input_.points, description_.up);
         uint64_t number = bucket.firstPoint;
         const std::vector<Key>& keys = sorted.sorted.key;
-        size_t begin = 0;
+        std::vector<size_t> begins{0};
         for (const Subtree& subtree : bucket.subtrees) {
             const uint32_t shift = frame().shiftOf(subtree.level);
-            size_t end = begin;
+            size_t end = begins.back();
             while (end < keys.size() && keys[end] >> shift == subtree.key >> shift) ++end;
-            out.ranges.add(frame(), sorted.sorted.points, begin, end, number);
-            BuiltSubtree built;
-            built.root = makeSubtree(frame(), sorted.sorted, begin, end, subtree.level, built.batch);
-            out.subtrees.push_back(std::move(built));
+            out.ranges.add(frame(), sorted.sorted.points, begins.back(), end, number);
             number += subtree.count;
-            begin = end;
+            begins.push_back(end);
         }
+        out.subtrees.resize(bucket.subtrees.size());
+        withinBucket().parallelFor(out.subtrees.size(), 1, [&](size_t from, size_t to) {
+            for (size_t k = from; k < to; ++k) {
+                BuiltSubtree& built = out.subtrees[k];
+                built.root = makeSubtree(frame(), sorted.sorted, begins[k], begins[k + 1], bucket.subtrees[k].level,
+                                         built.batch);
+            }
+        });
         ends("threads: levels, encode");
         return out;
     }
@@ -299,6 +308,7 @@ class PointStages final : public BuildStages {
     PointInput input_;
     RecordLayout layout_;
     uint64_t bucketPoints_ = 0, bufferBytes_ = 0;  ///< as the memory allows
+    const std::unique_ptr<Executor> serial_ = makeSerialExecutor();
     Workspace* workspace_ = nullptr;
     std::optional<Distribution> spread_;
     StoreDescription description_;

@@ -28,7 +28,7 @@ TEST(Select, IsWhatSortingSays) {
         }
         std::vector<int32_t> bits;
         for (const float v : values) bits.push_back(std::bit_cast<int32_t>(v));
-        while (bits.size() % kSelectLanes != 0) bits.push_back(kNothing);
+        while (bits.size() % kLanes != 0) bits.push_back(kNothing);
         std::sort(values.begin(), values.end());
         const auto rank = static_cast<size_t>(rng.uniform() * 0.9999 * static_cast<double>(count));
         for (const float guess : {0.0f, values[rank], 0.5f * values[rank], 2 * values[rank], 1e30f, 1e-30f})
@@ -39,12 +39,12 @@ TEST(Select, IsWhatSortingSays) {
 
 TEST(Select, DistancesFillWholeVectors) {
     const std::vector<float> x{1, 2, 3}, y{0, 0, 1}, z{0, 5, 1};
-    std::vector<int32_t> out(kSelectLanes, 7);
+    std::vector<int32_t> out(kLanes, 7);
     squaredDistances(x.data(), y.data(), z.data(), 3, {1, 0, 0}, out.data());
     EXPECT_EQ(std::bit_cast<float>(out[0]), 0);
     EXPECT_EQ(std::bit_cast<float>(out[1]), 26);
     EXPECT_EQ(std::bit_cast<float>(out[2]), 6);
-    for (size_t k = 3; k < kSelectLanes; ++k) EXPECT_EQ(out[k], kNothing);
+    for (size_t k = 3; k < kLanes; ++k) EXPECT_EQ(out[k], kNothing);
 }
 
 }  // namespace

@@ -9,20 +9,21 @@
 #include "engine/base/numbers.h"
 #include "engine/base/wide.h"
 #include "lod/builder/points/covered.h"
+#include "lod/builder/points/lanes.h"
 #include "lod/primitives/octahedral.h"
 #include "shaders/shared/border.h"
 
 namespace stipple::lod {
 namespace {
 
-constexpr uint32_t kDirections = 16;
+constexpr uint32_t kPlaneDirections = 16;
 constexpr float kColourSpread = 48.0f / 255.0f;  ///< largest tolerated difference from the mean, per channel, sRGB
 
 struct Directions {
-    std::array<float, kDirections> c, s;
+    alignas(64) std::array<float, kPlaneDirections> c, s;
     Directions() {
-        for (uint32_t k = 0; k < kDirections; ++k) {
-            const double a = 6.283185307179586 * k / kDirections;
+        for (uint32_t k = 0; k < kPlaneDirections; ++k) {
+            const double a = 6.283185307179586 * k / kPlaneDirections;
             c.at(k) = static_cast<float>(std::cos(a));
             s.at(k) = static_cast<float>(std::sin(a));
         }
@@ -191,43 +192,105 @@ float reachOfBalls(const Points& leaves, size_t begin, size_t end, const glm::dv
     return reach;
 }
 
+/// Leaves' discs beside a place, whole vectors of them.
+struct LeafDiscs {
+    static constexpr size_t kMost = 64;
+    using Column = std::array<float, kMost>;
+    alignas(64) Column x, y, z, nx, ny, nz, radius;
+    size_t count = 0;
+    void set(const Leaves& leaves, size_t begin, size_t end, const glm::dvec3& place) {
+        count = end - begin;
+        for (size_t k = 0; k < count; ++k) {
+            const glm::vec3 d(leaves.points.at(begin + k) - place), &n = leaves.normalOf(begin + k);
+            x[k] = d.x;
+            y[k] = d.y;
+            z[k] = d.z;
+            nx[k] = n.x;
+            ny[k] = n.y;
+            nz[k] = n.z;
+            radius[k] = leaves.points.radius[begin + k];
+        }
+        for (; count % kLanes != 0; ++count)  // the last one once more changes nothing
+            for (Column* column : {&x, &y, &z, &nx, &ny, &nz, &radius}) (*column)[count] = (*column)[count - 1];
+    }
+};
+/// What discs reach in the directions of a plane, over and under it, and from its middle; several values of each.
+struct DiscExtent {
+    static constexpr float kLeast = -1e30f;
+    alignas(64) std::array<float, kPlaneDirections> directions;
+    alignas(64) std::array<float, kLanes> above, below, reach{};
+    DiscExtent() {
+        directions.fill(kLeast);
+        above.fill(kLeast);
+        below.fill(kLeast);
+    }
+    void giveTo(Extent& e) const {
+        e.inner = *std::min_element(directions.begin(), directions.end());
+        e.above = *std::max_element(above.begin(), above.end());
+        e.below = *std::max_element(below.begin(), below.end());
+        e.reach = *std::max_element(reach.begin(), reach.end());
+    }
+};
+
+}  // namespace
+
+STIPPLE_WIDE static void addLeafDiscs(const LeafDiscs& discs, const Plane& plane, DiscExtent& extent) {
+    static_assert(kPlaneDirections == 2 * kLanes);
+    const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
+    const auto keepMost = [](Floats& most, const Floats& value) { most = value > most ? value : most; };
+    Floats above = floatsAt(extent.above.data(), 0).v, below = floatsAt(extent.below.data(), 0).v,
+           reach = floatsAt(extent.reach.data(), 0).v;
+    alignas(64) LeafDiscs::Column us, vs, insides;
+    for (size_t k = 0; k < discs.count; k += kLanes) {
+        const Floats x = floatsAt(discs.x.data(), k).v, y = floatsAt(discs.y.data(), k).v,
+                     z = floatsAt(discs.z.data(), k).v, radius = floatsAt(discs.radius.data(), k).v;
+        const Floats u = x * t1.x + y * t1.y + z * t1.z, v = x * t2.x + y * t2.y + z * t2.z,
+                     w = x * n.x + y * n.y + z * n.z;
+        const Floats along = n.x * floatsAt(discs.nx.data(), k).v + n.y * floatsAt(discs.ny.data(), k).v +
+                             n.z * floatsAt(discs.nz.data(), k).v;
+        Floats sine = 1.0f - along * along, far = u * u + v * v;
+        sine = sine > 0.0f ? sine : Floats{};
+        takeRoots(sine);
+        takeRoots(far);
+        const Floats rise = radius * sine;
+        keepMost(above, w + rise);
+        keepMost(below, rise - w);
+        keepMost(reach, far + radius);
+        floatsAt(us.data(), k).v = u;
+        floatsAt(vs.data(), k).v = v;
+        floatsAt(insides.data(), k).v = radius * (along > 0.0f ? along : -along);
+    }
+    const Floats c0 = floatsAt(kPlane.c.data(), 0).v, c1 = floatsAt(kPlane.c.data(), kLanes).v,
+                 s0 = floatsAt(kPlane.s.data(), 0).v, s1 = floatsAt(kPlane.s.data(), kLanes).v;
+    Floats first = floatsAt(extent.directions.data(), 0).v, second = floatsAt(extent.directions.data(), kLanes).v;
+    for (size_t k = 0; k < discs.count; ++k) {
+        keepMost(first, us[k] * c0 + vs[k] * s0 + insides[k]);
+        keepMost(second, us[k] * c1 + vs[k] * s1 + insides[k]);
+    }
+    floatsAt(extent.directions.data(), 0).v = first;
+    floatsAt(extent.directions.data(), kLanes).v = second;
+    floatsAt(extent.above.data(), 0).v = above;
+    floatsAt(extent.below.data(), 0).v = below;
+    floatsAt(extent.reach.data(), 0).v = reach;
+}
+
+namespace {
+
 /// Of the leaves themselves.
 Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const AggregateRecord& out) {
+    Extent e;
     if (!hasNormal(out)) {  // a ball has no plane
-        Extent e;
         e.reach = reachOfBalls(leaves.points, begin, end, out.place);
         return e;
     }
     const Plane plane(out);
-    const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
-    constexpr size_t kBlock = 64;
-    alignas(64) float us[kBlock], vs[kBlock], insides[kBlock];
-    alignas(64) std::array<float, kDirections> extent{};
-    extent.fill(-1e30f);
-    Extent e;
-    e.above = e.below = -1e30f;
-    for (size_t first = begin; first < end; first += kBlock) {
-        const size_t count = std::min(kBlock, end - first);
-        for (size_t k = 0; k < count; ++k) {
-            const size_t i = first + k;
-            const glm::vec3 d(leaves.points.at(i) - out.place);
-            const float radius = leaves.points.radius[i];
-            const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = glm::dot(d, n);
-            const float along = glm::dot(n, leaves.normalOf(i));
-            const float rise = radius * std::sqrt(std::max(0.0f, 1.0f - along * along));
-            e.above = std::max(e.above, w + rise);
-            e.below = std::max(e.below, rise - w);
-            e.reach = std::max(e.reach, std::sqrt(u * u + v * v) + radius);
-            us[k] = u;
-            vs[k] = v;
-            insides[k] = radius * std::abs(along);
-        }
-        for (size_t k = 0; k < count; ++k)
-            for (uint32_t direction = 0; direction < kDirections; ++direction)
-                extent[direction] =
-                    std::max(extent[direction], us[k] * kPlane.c[direction] + vs[k] * kPlane.s[direction] + insides[k]);
+    DiscExtent extent;
+    LeafDiscs discs;
+    for (size_t first = begin; first < end; first += LeafDiscs::kMost) {
+        discs.set(leaves, first, std::min(first + LeafDiscs::kMost, end), out.place);
+        addLeafDiscs(discs, plane, extent);
     }
-    e.inner = *std::min_element(extent.begin(), extent.end());
+    extent.giveTo(e);
     return e;
 }
 
@@ -242,7 +305,7 @@ Extent extentOf(std::span<const AggregateRecord> parts, const AggregateRecord& o
     }
     const Plane plane(out);
     const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
-    alignas(64) std::array<float, kDirections> extent{};
+    alignas(64) std::array<float, kPlaneDirections> extent{};
     extent.fill(-1e30f);
     Extent e;
     e.above = e.below = -1e30f;
@@ -260,7 +323,7 @@ Extent extentOf(std::span<const AggregateRecord> parts, const AggregateRecord& o
         // In any direction of the plane the leaves reach at least that far from the part's centre.
         const float moved = p.count == 1 ? static_cast<float>(glm::length(p.mean - p.place)) : 0.0f;
         const float inside = std::max(p.inner * std::abs(along) - slab * sine - moved, -p.radius);
-        for (uint32_t k = 0; k < kDirections; ++k)
+        for (uint32_t k = 0; k < kPlaneDirections; ++k)
             extent[k] = std::max(extent[k], u * kPlane.c[k] + v * kPlane.s[k] + inside);
     }
     e.inner = *std::min_element(extent.begin(), extent.end());

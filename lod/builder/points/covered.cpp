@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <optional>
 
 #include "engine/base/wide.h"
 #include "lod/builder/morton.h"
+#include "lod/builder/points/fan.h"
 
 namespace stipple::lod {
 namespace {
@@ -15,19 +15,8 @@ namespace {
 constexpr uint32_t kMostCells = 64 * 64 * 64;  ///< of clusters in a node
 /// Runs of a node's cells; empty between nodes.
 thread_local std::vector<Around::Run> cellRuns;
-
-/// Circles in a disc's plane, around its centre.
-struct Circles {
-    static constexpr size_t kMost = 1024;
-    alignas(64) std::array<float, kMost> u, v, radius;
-    size_t count = 0;
-    void add(float atU, float atV, float r) {
-        if (!(r > 0) || count == kMost) return;
-        u[count] = atU;
-        v[count] = atV;
-        radius[count++] = r;
-    }
-};
+/// Of the leaves around; they stay, for the next node.
+thread_local std::array<std::vector<float>, 7> columns;
 
 struct DiscPlane {
     glm::dvec3 place;
@@ -56,9 +45,8 @@ STIPPLE_WIDE static void addLeaves(const Around& around, const DiscPlane& plane,
     alignas(64) std::array<float, kBlock> us, vs, rs;
     const glm::vec3 o(plane.place - around.corner);
     const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
-    const float *const x = around.x.data(), *const y = around.y.data(), *const z = around.z.data(),
-                       *const nx = around.nx.data(), *const ny = around.ny.data(), *const nz = around.nz.data(),
-                       *const radius = around.radius.data();
+    const float *const x = around.x, *const y = around.y, *const z = around.z, *const nx = around.nx,
+                       *const ny = around.ny, *const nz = around.nz, *const radius = around.radius;
     const float e2 = error * error;
     const auto one = [&](size_t i, size_t k) {
         const float dx = x[i] - o.x, dy = y[i] - o.y, dz = z[i] - o.z, r = radius[i];
@@ -125,112 +113,6 @@ void addParts(const Around& around, const DiscPlane& plane, size_t begin, size_t
     }
 }
 
-constexpr size_t kRays = 32;
-/// Their directions; the first once more behind the last.
-struct Rays {
-    alignas(64) std::array<float, kRays + 1> c, s;
-    Rays() {
-        for (size_t k = 0; k <= kRays; ++k) {
-            const double a = 6.283185307179586 * static_cast<double>(k) / kRays;
-            c.at(k) = static_cast<float>(std::cos(a));
-            s.at(k) = static_cast<float>(std::sin(a));
-        }
-    }
-};
-const Rays kFan;
-
-}  // namespace
-
-/// `held`: how far out the disc is held between each ray and the next; farther where a circle around (u, v) begins
-/// there and reaches on. `power`: of the disc's centre, radius^2 - u^2 - v^2.
-STIPPLE_WIDE static void holdBetweenRays(float* held, float u, float v, float power) {
-    // A ray that misses the circle enters and leaves it at one place, which holds nothing.
-    alignas(64) std::array<float, kRays + 16> enter, leave;
-    for (size_t k = 0; k < kRays; ++k) {
-        const float along = u * kFan.c[k] + v * kFan.s[k], left = power + along * along;
-        const float half = std::sqrt(left > 0 ? left : 0);
-        enter[k] = along - half;
-        leave[k] = along + half;
-    }
-    enter[kRays] = enter[0];
-    leave[kRays] = leave[0];
-    for (size_t k = 0; k < kRays; ++k) {
-        const float from = enter[k] > enter[k + 1] ? enter[k] : enter[k + 1];
-        const float to = leave[k] < leave[k + 1] ? leave[k] : leave[k + 1];
-        const float reach = from <= held[k] ? to : 0;
-        held[k] = reach > held[k] ? reach : held[k];
-    }
-}
-
-namespace {
-
-/// Rays from the disc's centre, and how far out circles hold it between each two.
-class Fan {
-  public:
-    explicit Fan(float radius) : radius_(radius), rim_(radius / kNarrowest) {}
-    void add(float u, float v, float r) {
-        const float c2 = u * u + v * v, power = r * r - c2;
-        if (power > 0 && r > radius_ && c2 < (r - radius_) * (r - radius_)) {
-            held_.fill(rim_);
-            return;
-        }
-        holdBetweenRays(held_.data(), u, v, power);
-    }
-    /// Of what is still open between two rays, all that a single one of those circles holds. `circlesAt(u, v)`: which
-    /// of them to try for that place of the rim, [first, last).
-    template <typename CirclesAt>
-    void close(const Circles& circles, const CirclesAt& circlesAt) {
-        for (size_t k = 0; k < kRays; ++k) {
-            if (held_[k] >= rim_) continue;
-            const float c0 = kFan.c[k], s0 = kFan.s[k], c1 = kFan.c[k + 1], s1 = kFan.s[k + 1], in = held_[k];
-            const auto [first, last] = circlesAt(0.5f * (c0 + c1) * radius_, 0.5f * (s0 + s1) * radius_);
-            int32_t isClosed = 0;
-            for (size_t i = first; i < last; ++i) {
-                const float u = circles.u[i], v = circles.v[i], r2 = circles.radius[i] * circles.radius[i];
-                const auto off2 = [&](float x, float y) { return (x - u) * (x - u) + (y - v) * (y - v); };
-                const float a = off2(in * c0, in * s0), b = off2(in * c1, in * s1), c = off2(rim_ * c0, rim_ * s0),
-                            d = off2(rim_ * c1, rim_ * s1);
-                const float near = a > b ? a : b, far = c > d ? c : d, most = near > far ? near : far;
-                isClosed |= most < r2 ? 1 : 0;
-            }
-            if (isClosed != 0) held_[k] = rim_;
-        }
-    }
-    /// By how much circles would have to be wider for a single one to hold what is open between each two rays, at most.
-    float missing(const Circles& circles) const {
-        float most = 0;
-        for (size_t k = 0; k < kRays; ++k) {
-            if (held_[k] >= rim_) continue;
-            const float c0 = kFan.c[k], s0 = kFan.s[k], c1 = kFan.c[k + 1], s1 = kFan.s[k + 1], in = held_[k];
-            float least = 3e38f;
-            for (size_t i = 0; i < circles.count; ++i) {
-                const float u = circles.u[i], v = circles.v[i];
-                const auto off2 = [&](float x, float y) { return (x - u) * (x - u) + (y - v) * (y - v); };
-                const float a = off2(in * c0, in * s0), b = off2(in * c1, in * s1), c = off2(rim_ * c0, rim_ * s0),
-                            d = off2(rim_ * c1, rim_ * s1);
-                const float near = a > b ? a : b, far = c > d ? c : d;
-                const float lacks = std::sqrt(near > far ? near : far) - circles.radius[i];
-                least = lacks < least ? lacks : least;
-            }
-            most = least > most ? least : most;
-        }
-        return most;
-    }
-    bool isHeld() const { return least() >= rim_; }
-    /// Radius of a disc that is held.
-    float core() const { return least() * kNarrowest; }
-
-  private:
-    static constexpr float kNarrowest = 0.99518f;  ///< cosine of half the angle between two rays
-    float least() const {
-        float least = 3e38f;
-        for (size_t k = 0; k < kRays; ++k) least = held_[k] < least ? held_[k] : least;
-        return least;
-    }
-    float radius_, rim_;
-    alignas(64) std::array<float, kRays> held_{};
-};
-
 bool isWithNormals(std::span<const PendingNode> nodes) {
     const auto isNormal = [](uint32_t flags) { return (flags & shared::kFlagNoNormal) == 0; };
     return std::any_of(nodes.begin(), nodes.end(), [&](const PendingNode& node) {
@@ -243,9 +125,13 @@ bool isWithNormals(std::span<const PendingNode> nodes) {
 
 }  // namespace
 
+STIPPLE_WIDE static void placesBeside(const uint32_t* places, size_t count, double corner, float* beside) {
+    for (size_t k = 0; k < count; ++k) beside[k] = static_cast<float>(places[k] - corner);
+}
+
 Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* from,
                std::span<const PendingNode> children)
-    : grid(g), leaves(from), corner(g.base), firstCell_(key >> g.clusterShift) {
+    : grid(g), leaves(from), corner(g.base), firstCell_(key >> g.clusterShift), cellsPerUnit_(g.cellsAcross / g.edge) {
     cellRuns.resize(kMostCells);
     if (!(leaves != nullptr ? leaves->hasNormals : isWithNormals(children))) return;
     if (leaves == nullptr) {
@@ -264,19 +150,26 @@ Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* fro
                end = std::lower_bound(begin, all.end(), key + (Key{1} << keyBits));
     const size_t first = leaves->first + static_cast<size_t>(begin - all.begin()),
                  count = static_cast<size_t>(end - begin);
-    for (auto* column : {&x, &y, &z, &nx, &ny, &nz, &radius}) column->resize(count);
-    for (size_t k = 0; k < count; ++k) {
-        const Points& p = leaves->points;
-        const glm::vec3 place(p.at(first + k) - corner);
-        x[k] = place.x;
-        y[k] = place.y;
-        z[k] = place.z;
-        radius[k] = p.radius[first + k];
-        const glm::vec3& n = leaves->normalOf(first + k);
-        nx[k] = n.x;
-        ny[k] = n.y;
-        nz[k] = n.z;
+    for (std::vector<float>& column : columns)
+        if (column.size() < count) column.resize(count);
+    const auto at = [&](size_t k) { return columns.at(k).data(); };
+    x = at(0), y = at(1), z = at(2), nx = at(3), ny = at(4), nz = at(5), radius = at(6);
+    const Points& p = leaves->points;
+    if (p.high.empty()) {
+        const std::array<const std::vector<uint32_t>*, 3> places{&p.x, &p.y, &p.z};
+        for (int a = 0; a < 3; ++a)
+            placesBeside(places.at(static_cast<size_t>(a))->data() + first, count, corner[a],
+                         at(static_cast<size_t>(a)));
+    } else {
+        for (size_t k = 0; k < count; ++k) {
+            const glm::vec3 place(p.at(first + k) - corner);
+            for (int a = 0; a < 3; ++a) at(static_cast<size_t>(a))[k] = place[a];
+        }
     }
+    std::copy_n(p.radius.begin() + static_cast<ptrdiff_t>(first), count, at(6));
+    const glm::vec3* const normals = &leaves->normalOf(first);
+    for (int a = 0; a < 3; ++a)
+        for (size_t k = 0; k < count; ++k) at(static_cast<size_t>(3 + a))[k] = normals[k][a];
     number(std::span(begin, end));
 }
 
@@ -296,7 +189,7 @@ Around::~Around() {
 Around::Run Around::at(Key key) const { return cellRuns[static_cast<size_t>((key >> grid.clusterShift) - firstCell_)]; }
 
 uint32_t Around::cellAt(const glm::dvec3& place) const {
-    const glm::dvec3 at = (place - grid.base) * (grid.cellsAcross / grid.edge);
+    const glm::dvec3 at = (place - grid.base) * cellsPerUnit_;
     const double most = grid.cellsAcross;
     if (!(at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < most && at.y < most && at.z < most)) return kMostCells;
     return static_cast<uint32_t>(
@@ -341,30 +234,29 @@ class Holding {
         Fan fan(plane_.radius);
         circles_.count = 0;
         add(around_.at(key_), kMostOwn, error);
-        for (size_t k = 0; k < circles_.count; ++k) add(k, fan);
-        if (fan.isHeld()) return error;
+        if (fan.add(circles_)) return error;
         // Mostly what lies just where the disc reaches out of its cell is enough.
         std::array<Near, kMostNear> near;
         size_t cells = 0;
-        fan.close(circles_, [&](float u, float v) -> std::pair<size_t, size_t> {
+        const bool isHeld = fan.close(circles_, [&](float u, float v) -> Circles::Range {
             const uint32_t cell = around_.cellAt(plane_.place + glm::dvec3(u * plane_.t1 + v * plane_.t2));
             for (size_t k = 0; k < cells; ++k)
-                if (near.at(k).cell == cell) return {near.at(k).first, near.at(k).last};
+                if (near[k].cell == cell) return near[k].circles;
             const Around::Run run = around_.inCell(cell);
-            if (run.begin == run.end || cells == kMostNear) return {0, 0};
+            if (run.begin == run.end || cells == kMostNear) return {};
             const size_t first = circles_.count;
             add(run, kMostBeside, error);
-            near.at(cells++) = {cell, first, circles_.count};
+            near[cells++] = {cell, {first, circles_.count}};
             return {first, circles_.count};
         });
-        return fan.isHeld() ? error : heldByAllWith(error, fan);
+        return isHeld ? error : heldByAllWith(error, fan);
     }
 
   private:
     static constexpr size_t kMostBeside = 24, kMostNear = 8;
     struct Near {
         uint32_t cell;
-        size_t first, last;
+        Circles::Range circles;
     };
 
     float heldByAllWith(float error, Fan& fan) {
@@ -376,11 +268,9 @@ class Holding {
         knowsBeside_ = true;
         const size_t first = circles_.count;
         for (size_t k = 0; k < count_; ++k) add(beside_.at(k), kMostBeside, error);
-        fan.close(circles_, [&](float, float) { return std::pair(first, circles_.count); });
-        if (fan.isHeld()) return error;
+        if (fan.close(circles_, [&](float, float) { return Circles::Range{first, circles_.count}; })) return error;
         return (error + fan.missing(circles_)) * (1 + 1e-5f);
     }
-    void add(size_t k, Fan& fan) const { fan.add(circles_.u[k], circles_.v[k], circles_.radius[k]); }
     void add(Around::Run run, size_t most, float error) {
         const size_t stride = (run.end - run.begin + most - 1) / most;
         if (stride == 0) return;
@@ -543,16 +433,18 @@ void measureCore(AggregateRecord& record, const Around& around, bool isAll) {
     const DiscPlane plane(record);
     const Around::Run run = around.at(record.key);
     const size_t stride = (run.end - run.begin + kMost - 1) / kMost;
+    std::array<Seen, kMost> seen;
+    size_t count = 0;
+    for (size_t i = run.begin; i < run.end; i += stride)
+        seen[count++] = around.leaves != nullptr ? seenLeaf(around, plane, i) : seenPart(around, plane, i);
+    thread_local Circles circles;
     for (int k = kFinest; k > 0; --k) {
         const float hole = std::ldexp(plane.radius, -k);
         if (hole >= error) return;
-        Fan fan(plane.radius);
-        for (size_t i = run.begin; i < run.end; i += stride) {
-            const auto [u, v, core, beside] =
-                around.leaves != nullptr ? seenLeaf(around, plane, i) : seenPart(around, plane, i);
-            if (beside <= hole) fan.add(u, v, (core + hole - beside) * kRounded);
-        }
-        const float core = std::min(fan.core(), plane.radius);
+        circles.count = 0;
+        for (const Seen& s : std::span(seen).first(count))
+            if (s.hole <= hole) circles.add(s.u, s.v, (s.core + hole - s.hole) * kRounded);
+        const float core = std::min(Fan(plane.radius).addAll(circles), plane.radius);
         if (core < 0.5f * plane.radius) continue;
         record.core = core;
         record.hole = hole;

@@ -10,8 +10,7 @@
 //      \  o . o     /
 //        ---_____---
 //
-// Whether they do is seen along 32 rays from the disc's centre: between two of them the disc is held as far out as one
-// circle after the other holds both rays. That errs towards larger errors only.
+// Whether they do is seen along rays from the disc's centre (fan.h), which errs towards larger errors only.
 #pragma once
 
 #include "lod/builder/points/aggregate.h"
@@ -43,12 +42,14 @@ class Around {
     const Leaves* leaves = nullptr;
     std::vector<AggregateRecord> parts;  ///< without leaves
     // Otherwise of the leaves, beside the node's corner: place, normal (zero: none), radius.
-    std::vector<float> x, y, z, nx, ny, nz, radius;
+    const float *x = nullptr, *y = nullptr, *z = nullptr, *nx = nullptr, *ny = nullptr, *nz = nullptr,
+                *radius = nullptr;
     glm::dvec3 corner{0};
 
   private:
     void number(std::span<const Key> keys);
     Key firstCell_ = 0;
+    double cellsPerUnit_ = 0;
     std::vector<uint32_t> used_;
 };
 

@@ -62,9 +62,9 @@ constexpr uint32_t kNoNormal = ~0u;  ///< no octahedral code
 template <typename K>
 class Estimator : Surroundings<K> {
   public:
-    Estimator(const Frame& frame, const CellTree& tree, const EstimateSettings& settings, const Places& ghosts,
-              SortedPoints& own)
-        : Surroundings<K>(frame, tree, ghosts, own), settings_(settings) {}
+    Estimator(const Frame& frame, const CellTree& tree, const EstimateSettings& settings, const SeenKeys<K>& keys,
+              const Places& ghosts, SortedPoints& own)
+        : Surroundings<K>(frame, tree, keys, ghosts, own), settings_(settings) {}
 
     void cell(uint32_t index) {
         const Cell& c = tree_.cells()[index];
@@ -198,7 +198,7 @@ class Estimator : Surroundings<K> {
     };
     /// Of all in the neighbourhood. `p`: one of them.
     Spread spreadOfNeighbourhood(const glm::vec3& p) {
-        squared_.assign((neighbourhood_.count + kSelectLanes) / kSelectLanes * kSelectLanes, kNothing);
+        squared_.assign((neighbourhood_.count + kLanes) / kLanes * kLanes, kNothing);
         std::fill_n(squared_.begin(), neighbourhood_.count, 0);
         return spreadOf(neighbourhood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
     }
@@ -269,7 +269,7 @@ class Estimator : Surroundings<K> {
         const size_t n = neighbourhood_.count, rank = std::min(kNeighbours, n - 1);  // the point itself comes first
         const Neighbours all = neighbourhood_.neighbours();
         const bool hasOwnNormals = settings_.isFine || window.isBent, isEach = hasOwnNormals || window.mayBeAlone;
-        squared_.resize(n + kSelectLanes);
+        squared_.resize(n + kLanes);
         // Of a rectangle's points that are spread evenly: variances are 1/12 of its sides squared.
         const Spread& whole = window.spread;
         const auto evenly = static_cast<float>(whole.points < 3 ? 0
@@ -403,7 +403,7 @@ class Estimator : Surroundings<K> {
         if (window.across > 0) seen_.gather(window.cell, window.across, ~0u, others_);
         const Neighbourhood& all = window.across > 0 ? others_ : neighbourhood_;
         const size_t n = all.count;
-        squaredOfOther_.resize(n + kSelectLanes);
+        squaredOfOther_.resize(n + kLanes);
         spacings_.clear();
         for (size_t k = 0; k < neighbourhood_.count; ++k) {
             const float squared = std::bit_cast<float>(squared_[k]);
@@ -433,18 +433,21 @@ class Estimator : Surroundings<K> {
 }  // namespace
 
 void estimate(const Frame& frame, const CellTree& tree, uint32_t firstCell, uint32_t cells,
-              const EstimateSettings& settings, const Places& ghosts, SortedPoints& own) {
+              const EstimateSettings& settings, const Places& ghosts, Executor& executor, SortedPoints& own) {
     Points& p = own.points;
     p.normal.resize(p.size());
     p.radius.resize(p.size());
+    const auto all = [&]<typename K>(const SeenKeys<K>& keys) {
+        executor.parallelFor(cells, 1, [&](size_t begin, size_t end) {
+            Estimator<K> estimator(frame, tree, settings, keys, ghosts, own);
+            for (size_t k = begin; k < end; ++k) estimator.cell(firstCell + static_cast<uint32_t>(k));
+        });
+    };
     if (settings.radii || settings.normals) {
-        const auto all = [&](auto estimator) {
-            for (uint32_t k = 0; k < cells; ++k) estimator.cell(firstCell + k);
-        };
         if (frame.keyLevels > kShortBits)
-            all(Estimator<Key>(frame, tree, settings, ghosts, own));
+            all(SeenKeys<Key>(ghosts, own));
         else
-            all(Estimator<uint64_t>(frame, tree, settings, ghosts, own));
+            all(SeenKeys<uint64_t>(ghosts, own));
     }
     // Stray points have their neighbours far away.
     const float limit =

@@ -1,6 +1,7 @@
 // Missing radii and normals, from windows of the lattice.
 #pragma once
 
+#include "engine/base/executor.h"
 #include "lod/builder/points/sorted.h"
 
 namespace stipple::lod {
@@ -12,8 +13,9 @@ struct EstimateSettings {
 };
 
 /// The points of the counted cells [firstCell, firstCell + cells), all of `own`. `ghosts`: points of other buckets near
-/// by, at least all that those cells see (see Distributor). Rounds normals to what records hold.
+/// by, at least all that those cells see (see Distributor). Rounds normals to what records hold. Threads of `executor`
+/// that have nothing else to do take cells.
 void estimate(const Frame& frame, const CellTree& tree, uint32_t firstCell, uint32_t cells,
-              const EstimateSettings& settings, const Places& ghosts, SortedPoints& own);
+              const EstimateSettings& settings, const Places& ghosts, Executor& executor, SortedPoints& own);
 
 }  // namespace stipple::lod

@@ -6,36 +6,31 @@
 #include "engine/base/wide.h"
 
 namespace stipple::lod {
-namespace {
-
-using Lanes = int32_t __attribute__((vector_size(4 * kSelectLanes), aligned(4), may_alias));
-
-}  // namespace
 
 /// Guesses a threshold and counts: squared distances on a surface are spread evenly, so the count says where to guess
 /// next; every third step bisects. With a few too many below the threshold the largest of them are taken away.
 STIPPLE_WIDE float smallestAtRank(const int32_t* values, size_t count, size_t rank, float guess) {
     constexpr float kFew = 3;
-    const auto* const v = reinterpret_cast<const Lanes*>(values);
-    const size_t vectors = (count + kSelectLanes - 1) / kSelectLanes;
+    const auto* const v = reinterpret_cast<const Anywhere<Lanes>*>(values);
+    const size_t vectors = (count + kLanes - 1) / kLanes;
     const auto wanted = static_cast<float>(rank) + 1;
     float lo = 0, hi = 0, below = 0, above = 0;  // at hi there are `above`, more than `rank`
     const auto countUpTo = [&](float threshold) {
         const int32_t limit = std::bit_cast<int32_t>(threshold);
         Lanes sum{};
-        for (size_t i = 0; i < vectors; ++i) sum -= v[i] <= limit;
+        for (size_t i = 0; i < vectors; ++i) sum -= v[i].v <= limit;
         int32_t all = 0;
-        for (size_t k = 0; k < kSelectLanes; ++k) all += sum[k];
+        for (size_t k = 0; k < kLanes; ++k) all += sum[k];
         return static_cast<float>(all);
     };
     const auto largestBelow = [&](int32_t limit) {
         Lanes most{};
         for (size_t i = 0; i < vectors; ++i) {
-            const Lanes within = (v[i] < limit) & v[i];
+            const Lanes within = (v[i].v < limit) & v[i].v;
             most = within > most ? within : most;
         }
         int32_t result = 0;
-        for (size_t k = 0; k < kSelectLanes; ++k) result = std::max(result, most[k]);
+        for (size_t k = 0; k < kLanes; ++k) result = std::max(result, most[k]);
         return result;
     };
     if (guess > 0) {
@@ -58,14 +53,19 @@ STIPPLE_WIDE float smallestAtRank(const int32_t* values, size_t count, size_t ra
     }
     int32_t result = largestBelow(std::bit_cast<int32_t>(hi) + 1);
     while (above > wanted) {
-        // How many are equal to the largest? They go together.
-        const int32_t next = largestBelow(result);
-        const float rest = above - wanted;
-        Lanes equal{};
-        for (size_t i = 0; i < vectors; ++i) equal -= v[i] == result;
-        int32_t times = 0;
-        for (size_t k = 0; k < kSelectLanes; ++k) times += equal[k];
-        if (static_cast<float>(times) > rest) break;
+        // How many are equal to the largest? They go together. And which one is the next?
+        Lanes equal{}, most{};
+        for (size_t i = 0; i < vectors; ++i) {
+            const Lanes value = v[i].v, within = (value < result) & value;
+            equal -= value == result;
+            most = within > most ? within : most;
+        }
+        int32_t times = 0, next = 0;
+        for (size_t k = 0; k < kLanes; ++k) {
+            times += equal[k];
+            next = std::max(next, most[k]);
+        }
+        if (static_cast<float>(times) > above - wanted) break;
         above -= static_cast<float>(times);
         result = next;
     }
@@ -78,7 +78,7 @@ STIPPLE_WIDE void squaredDistances(const float* __restrict x, const float* __res
         const float dx = x[k] - from[0], dy = y[k] - from[1], dz = z[k] - from[2];
         out[k] = std::bit_cast<int32_t>(dx * dx + dy * dy + dz * dz);
     }
-    for (size_t k = n; k % kSelectLanes != 0; ++k) out[k] = kNothing;
+    for (size_t k = n; k % kLanes != 0; ++k) out[k] = kNothing;
 }
 
 }  // namespace stipple::lod

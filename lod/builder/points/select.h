@@ -4,10 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "lod/builder/points/lanes.h"
+
 namespace stipple::lod {
 
-/// Values come in vectors of that many; those behind the last are kNothing.
-inline constexpr size_t kSelectLanes = 8;
+/// Values come in vectors of kLanes; those behind the last are this.
 inline constexpr int32_t kNothing = INT32_MAX;
 
 /// The value at `rank` (0: the least) of `count` > `rank` non-negative floats, given as their bits: those have the same

@@ -8,16 +8,14 @@
 #include <limits>
 
 #include "engine/base/wide.h"
+#include "lod/builder/points/lanes.h"
 #include "lod/builder/points/select.h"
 
 namespace stipple::lod {
 namespace {
 
-using Lanes = int32_t __attribute__((vector_size(4 * kSelectLanes), aligned(4), may_alias));
-using Pairs = int64_t __attribute__((vector_size(4 * kSelectLanes), aligned(4), may_alias));
-using Floats = float __attribute__((vector_size(4 * kSelectLanes), aligned(4), may_alias));
 constexpr size_t kHalf = kDirections / 2;
-static_assert(kHalf == kSelectLanes);
+static_assert(kHalf == kLanes);
 
 constexpr double kThin = 0.02;    ///< second variance over the first: a line, whatever the third
 constexpr double kRound = 12.0;   ///< second variance over the third, of a line with noise at most
@@ -37,39 +35,39 @@ struct Sums {
 
 STIPPLE_WIDE static void addUp(const Neighbours& all, const float (&from)[3], const int32_t* squared, int32_t limit,
                                Sums& sums) {
-    const auto* const distance = reinterpret_cast<const Lanes*>(squared);
-    const auto* const x = reinterpret_cast<const Floats*>(all.x);
-    const auto* const y = reinterpret_cast<const Floats*>(all.y);
-    const auto* const z = reinterpret_cast<const Floats*>(all.z);
-    const size_t vectors = (all.count + kSelectLanes - 1) / kSelectLanes;
+    const auto* const distance = reinterpret_cast<const Anywhere<Lanes>*>(squared);
+    const auto* const x = reinterpret_cast<const Anywhere<Floats>*>(all.x);
+    const auto* const y = reinterpret_cast<const Anywhere<Floats>*>(all.y);
+    const auto* const z = reinterpret_cast<const Anywhere<Floats>*>(all.z);
+    const size_t vectors = (all.count + kLanes - 1) / kLanes;
     const auto keepOnly = [](Floats& v, const Lanes& mask) {
         v = reinterpret_cast<Floats>(reinterpret_cast<Lanes>(v) & mask);
     };
     const auto total = [](const Floats& v) {
         float sum = 0;
-        for (size_t k = 0; k < kSelectLanes; ++k) sum += v[k];
+        for (size_t k = 0; k < kLanes; ++k) sum += v[k];
         return sum;
     };
     Lanes count{};
     Floats mx{}, my{}, mz{};
     for (size_t i = 0; i < vectors; ++i) {
-        const Lanes within = distance[i] <= limit;
+        const Lanes within = distance[i].v <= limit;
         count -= within;
-        Floats dx = x[i] - from[0], dy = y[i] - from[1], dz = z[i] - from[2];
+        Floats dx = x[i].v - from[0], dy = y[i].v - from[1], dz = z[i].v - from[2];
         for (Floats* d : {&dx, &dy, &dz}) keepOnly(*d, within);
         mx += dx;
         my += dy;
         mz += dz;
     }
     int32_t n = 0;
-    for (size_t k = 0; k < kSelectLanes; ++k) n += count[k];
+    for (size_t k = 0; k < kLanes; ++k) n += count[k];
     sums.n = static_cast<float>(n);
     const float scale = n > 0 ? 1.0f / sums.n : 0.0f;
     sums.mean = {from[0] + scale * total(mx), from[1] + scale * total(my), from[2] + scale * total(mz)};
     Floats xx{}, xy{}, xz{}, yy{}, yz{}, zz{};
     for (size_t i = 0; i < vectors; ++i) {
-        const Lanes within = distance[i] <= limit;
-        Floats dx = x[i] - sums.mean[0], dy = y[i] - sums.mean[1], dz = z[i] - sums.mean[2];
+        const Lanes within = distance[i].v <= limit;
+        Floats dx = x[i].v - sums.mean[0], dy = y[i].v - sums.mean[1], dz = z[i].v - sums.mean[2];
         for (Floats* d : {&dx, &dy, &dz}) keepOnly(*d, within);
         xx += dx * dx;
         xy += dx * dy;
@@ -81,55 +79,107 @@ STIPPLE_WIDE static void addUp(const Neighbours& all, const float (&from)[3], co
     sums.products = {total(xx), total(xy), total(xz), total(yy), total(yz), total(zz)};
 }
 
-/// Neighbours that cannot raise the least value above `floor` are left out, which most cannot once the nearest ones
-/// are in: those lie in the middle of a neighbourhood.
-STIPPLE_WIDE static void supports(const Neighbours& all, const float (&from)[3], const float (&axis)[3],
-                                  const float (&across)[3], float floor, int32_t* out) {
+namespace {
+
+/// What neighbours say of the extents in half of the directions, and in those opposite. Lanes are directions.
+struct Extents {
+    Lanes there{}, opposite{};
+    [[gnu::always_inline]] float least() const {
+        const Lanes lesser = there < opposite ? there : opposite;
+        int32_t least = lesser[0];
+        for (size_t k = 1; k < kLanes; ++k) least = std::min(least, lesser[k]);
+        return std::bit_cast<float>(least);
+    }
+};
+
+/// Neighbours after inversion in the unit sphere, in the plane's axes; of those that do not count 0, which says
+/// nothing.
+struct Inverted {
+    alignas(64) std::array<float, kNearest * kLanes> u, v;
+};
+
+/// A place on a surface, and the axes of the plane there.
+struct PlaneAt {
+    const float (&from)[3], (&axis)[3], (&across)[3];  // NOLINT: as they come
+
+    /// Squared distances of vector `i` of the neighbours.
+    [[gnu::always_inline]] void measure(const Neighbours& all, size_t i, Floats& dx, Floats& dy, Floats& dz,
+                                        Floats& squared) const {
+        dx = floatsAt(all.x, kLanes * i).v - from[0];
+        dy = floatsAt(all.y, kLanes * i).v - from[1];
+        dz = floatsAt(all.z, kLanes * i).v - from[2];
+        squared = dx * dx + dy * dy + dz * dz;
+    }
+    [[gnu::always_inline]] void invert(const Floats& dx, const Floats& dy, const Floats& dz, const Floats& squared,
+                                       const Lanes& isMeant, Inverted& inverted, size_t to) const {
+        const Floats u = dx * axis[0] + dy * axis[1] + dz * axis[2],
+                     v = dx * across[0] + dy * across[1] + dz * across[2];
+        const Floats flat = u * u + v * v;
+        Floats root = flat * squared;
+        takeRoots(root);
+        const Lanes counts = isMeant & (flat > 0.0f) & (flat >= kSteep * squared);
+        const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Lanes>(1.0f / root) & counts);
+        floatsAt(inverted.u.data(), kLanes * to).v = u * inverse;
+        floatsAt(inverted.v.data(), kLanes * to).v = v * inverse;
+    }
+};
+
+/// Of the first `vectors` of them.
+[[gnu::always_inline]] inline void extend(const Inverted& inverted, size_t vectors, Extents& extents) {
     // The first half of the directions; the others are opposite.
     const Floats cosines{1, 0.92387953f, 0.70710678f, 0.38268343f, 0, -0.38268343f, -0.70710678f, -0.92387953f},
         sines{0, 0.38268343f, 0.70710678f, 0.92387953f, 1, 0.92387953f, 0.70710678f, 0.38268343f};
     constexpr auto kSign = static_cast<int32_t>(0x80000000u);
-    Lanes there{}, opposite{};
-    float a[kSelectLanes], b[kSelectLanes];  // NOLINT: whole vectors
-    const size_t vectors = (all.count + kSelectLanes - 1) / kSelectLanes;
+    Lanes there = extents.there, opposite = extents.opposite;
+    for (size_t k = 0; k < vectors * kLanes; ++k) {
+        // Non-negative floats have the order of their bits, negative ones are less than 0 as integers too.
+        const Lanes along = reinterpret_cast<Lanes>(cosines * inverted.u[k] + sines * inverted.v[k]),
+                    against = along ^ kSign;
+        there = along > there ? along : there;
+        opposite = against > opposite ? against : opposite;
+    }
+    extents.there = there;
+    extents.opposite = opposite;
+}
+
+}  // namespace
+
+/// First the vectors in the middle of the neighbourhood, where the nearest are. Neighbours that cannot raise the least
+/// value above `floor` are left out, which most of the others cannot then.
+STIPPLE_WIDE static void supports(const Neighbours& all, const float (&from)[3], const float (&axis)[3],
+                                  const float (&across)[3], float floor, int32_t* out) {
+    const PlaneAt plane{from, axis, across};
+    const size_t vectors = (all.count + kLanes - 1) / kLanes;
+    const size_t first = vectors > 1 ? vectors / 2 - 1 : 0, last = std::min(first + kNearest, vectors);
     float farthest = 1 / (floor * floor);  // squared distance of what can still count
-    for (size_t step = 0, at = vectors / 2; step < vectors; ++step) {
-        // From the middle to both sides in turn.
-        if (step > 0) at = at >= step && step % 2 == 1 ? at - step : at + step;
-        const size_t i = kSelectLanes * at;
-        const Floats dx = *reinterpret_cast<const Floats*>(all.x + i) - from[0],
-                     dy = *reinterpret_cast<const Floats*>(all.y + i) - from[1],
-                     dz = *reinterpret_cast<const Floats*>(all.z + i) - from[2];
-        const Floats squared = dx * dx + dy * dy + dz * dz;
-        Lanes counts = (squared > 0.0f) & (squared < farthest);  // (not itself)
-        const size_t last = std::min(all.count - i, kSelectLanes);
-        const auto& pairs = reinterpret_cast<const Pairs&>(counts);
-        if ((pairs[0] | pairs[1] | pairs[2] | pairs[3]) == 0) continue;
-        const Floats u = dx * axis[0] + dy * axis[1] + dz * axis[2],
-                     v = dx * across[0] + dy * across[1] + dz * across[2];
-        const Floats flat = u * u + v * v, product = flat * squared;
-        counts &= (flat > 0.0f) & (flat >= kSteep * squared);
-        for (size_t k = 0; k < kSelectLanes; ++k) a[k] = std::sqrt(product[k]);
-        const Floats inverse =
-            reinterpret_cast<Floats>(reinterpret_cast<Lanes>(1.0f / *reinterpret_cast<Floats*>(a)) & counts);
-        *reinterpret_cast<Floats*>(a) = u * inverse;
-        *reinterpret_cast<Floats*>(b) = v * inverse;
-        for (size_t k = 0; k < last; ++k) {
-            // Non-negative floats have the order of their bits, negative ones are less than 0 as integers too.
-            const Lanes along = reinterpret_cast<Lanes>(cosines * a[k] + sines * b[k]), against = along ^ kSign;
-            there = along > there ? along : there;
-            opposite = against > opposite ? against : opposite;
-        }
-        if (step >= kNearest) continue;
-        const Lanes lesser = there < opposite ? there : opposite;
-        int32_t least = lesser[0];
-        for (size_t k = 1; k < kSelectLanes; ++k) least = std::min(least, lesser[k]);
-        const float bound = std::max(floor, std::bit_cast<float>(least) * 0.999f);
-        farthest = 1 / (bound * bound);
+    const auto keepThose = [&](size_t i, Lanes& isMeant) {
+        isMeant &= kNumbers < static_cast<int32_t>(all.count - kLanes * i);
+    };
+    Floats dx, dy, dz, squared;
+    Inverted inverted;
+    Extents extents;
+    for (size_t i = first; i < last; ++i) {
+        plane.measure(all, i, dx, dy, dz, squared);
+        Lanes isMeant = (squared > 0.0f) & (squared < farthest);  // (not itself)
+        keepThose(i, isMeant);
+        plane.invert(dx, dy, dz, squared, isMeant, inverted, i - first);
+    }
+    extend(inverted, last - first, extents);
+    const float bound = std::max(floor, extents.least() * 0.999f);
+    farthest = 1 / (bound * bound);
+    for (size_t i = 0; i < vectors; ++i) {
+        if (i == first) i = last;
+        if (i >= vectors) break;
+        plane.measure(all, i, dx, dy, dz, squared);
+        Lanes isMeant = (squared > 0.0f) & (squared < farthest);
+        keepThose(i, isMeant);
+        if (!isAny(isMeant)) continue;
+        plane.invert(dx, dy, dz, squared, isMeant, inverted, 0);
+        extend(inverted, 1, extents);
     }
     for (size_t k = 0; k < kHalf; ++k) {
-        out[k] = there[k];
-        out[k + kHalf] = opposite[k];
+        out[k] = extents.there[k];
+        out[k + kHalf] = extents.opposite[k];
     }
 }
 
@@ -174,18 +224,18 @@ std::array<float, kDirections> inverseExtents(const Neighbours& all, const float
 STIPPLE_WIDE static int32_t leastCorner(const int32_t* around, float floor, float steep) {
     const int32_t least = std::bit_cast<int32_t>(floor);
     Lanes found = Lanes{} + kNothing;
-    for (size_t i = 0; i < kDirections; i += kSelectLanes) {
-        const Lanes left = *reinterpret_cast<const Lanes*>(around + i),
-                    h = *reinterpret_cast<const Lanes*>(around + i + 1),
-                    right = *reinterpret_cast<const Lanes*>(around + i + 2);
+    for (size_t i = 0; i < kDirections; i += kLanes) {
+        const Lanes left = reinterpret_cast<const Anywhere<Lanes>*>(around + i)->v,
+                    h = reinterpret_cast<const Anywhere<Lanes>*>(around + i + 1)->v,
+                    right = reinterpret_cast<const Anywhere<Lanes>*>(around + i + 2)->v;
         const Lanes nearer = left < right ? left : right;
-        const Lanes steepest = reinterpret_cast<Lanes>(steep * reinterpret_cast<const Floats&>(h));
+        const Lanes steepest = reinterpret_cast<Lanes>(steep * reinterpret_cast<Floats>(h));
         const Lanes isCorner = (h >= least) & (h <= nearer) & (nearer <= steepest);
         const Lanes here = isCorner ? h : Lanes{} + kNothing;
         found = here < found ? here : found;
     }
     int32_t result = kNothing;
-    for (size_t k = 0; k < kSelectLanes; ++k) result = std::min(result, found[k]);
+    for (size_t k = 0; k < kLanes; ++k) result = std::min(result, found[k]);
     return result;
 }
 

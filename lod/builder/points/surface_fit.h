@@ -12,7 +12,7 @@
 
 namespace stipple::lod {
 
-/// Neighbourhood of neighbours, parallel; each with room for whole vectors of kSelectLanes.
+/// Neighbourhood of neighbours, parallel; each with room for whole vectors of kLanes (behind the last: any numbers).
 struct Neighbours {
     const float *x, *y, *z;
     size_t count;
@@ -24,8 +24,8 @@ struct Neighbourhood {
     size_t count = 0;
     void resize(size_t n) {
         count = n;
-        if (x.size() < n + kSelectLanes)
-            for (auto* axis : {&x, &y, &z}) axis->resize(2 * n + kSelectLanes);
+        if (x.size() < n + kLanes)
+            for (auto* axis : {&x, &y, &z}) axis->resize(2 * n + kLanes);
     }
     void add(const glm::vec3& p) {
         resize(count + 1);

@@ -6,22 +6,33 @@
 #include <vector>
 
 #include "lod/builder/points/estimate.h"
+#include "lod/builder/points/inside.h"
 #include "lod/builder/points/lattice_box.h"
 #include "lod/builder/points/seen.h"
 
 namespace stipple::lod {
 
-/// Of one counted cell at a time. K: Key, or uint64_t where that holds all keys, which is most often and faster.
+/// A bucket and the ghosts around it. K: Key, or uint64_t where that holds all keys, which is most often and faster.
+template <typename K>
+struct SeenKeys {
+    SortedKeys<K> own, ghosts;
+    SeenKeys(const Places& ghostPlaces, const SortedPoints& ownPoints) : own(ownPoints.key), ghosts(ghostPlaces.key) {}
+};
+
+/// Of one counted cell at a time.
 template <typename K>
 class Surroundings {
   protected:
-    Surroundings(const Frame& frame, const CellTree& tree, const Places& ghosts, SortedPoints& own)
+    /// `keys`: of `ghosts` and `own`.
+    Surroundings(const Frame& frame, const CellTree& tree, const SeenKeys<K>& keys, const Places& ghosts,
+                 SortedPoints& own)
         : frame_(frame),
           tree_(tree),
           ghosts_(ghosts),
           own_(own),
-          keys_(own.key.begin(), own.key.end()),
-          ghostKeys_(ghosts.key.begin(), ghosts.key.end()) {}
+          allKeys_(keys),
+          keys_(keys.own.all()),
+          ghostKeys_(keys.ghosts.all()) {}
 
     void setCell(const Cell& c) {
         cell_ = c;
@@ -78,12 +89,20 @@ class Surroundings {
     template <typename Of, typename F>
     void descend(const std::vector<K>& keys, const Of& points, size_t begin, size_t end, uint32_t level,
                  const LatticeBox& box, const F& f) const {
-        constexpr size_t kFew = 128;
+        constexpr size_t kFew = 256;
         if (begin == end) return;
         if (end - begin <= kFew || level >= frame_.keyLevels) {
+            const auto see = [&](size_t i, int64_t x, int64_t y, int64_t z) {
+                if (isSeen(keys[i], x, y, z)) f(x, y, z);
+            };
+            if (points.high.empty()) {
+                forInside({points.x.data(), points.y.data(), points.z.data()}, begin, end, box,
+                          [&](size_t i) { see(i, points.x[i], points.y[i], points.z[i]); });
+                return;
+            }
             for (size_t i = begin; i < end; ++i)
                 withPlace(points, i, [&](int64_t x, int64_t y, int64_t z) {
-                    if (box.holds(x, y, z) && isSeen(keys[i], x, y, z)) f(x, y, z);
+                    if (box.holds(x, y, z)) see(i, x, y, z);
                 });
             return;
         }
@@ -153,8 +172,8 @@ class Surroundings {
             if (x < 0 || y < 0 || z < 0 || x >= root || y >= root || z >= root) continue;
             const auto at = static_cast<K>(
                 frame_.keyOf(static_cast<uint64_t>(x), static_cast<uint64_t>(y), static_cast<uint64_t>(z)));
-            to.own = keyRange(keys_, at, frame_.shiftOf(level), allOwn());
-            to.ghosts = keyRange(ghostKeys_, at, frame_.shiftOf(level), allGhosts());
+            to.own = allKeys_.own.range(at, frame_.shiftOf(level));
+            to.ghosts = allKeys_.ghosts.range(at, frame_.shiftOf(level));
         }
     }
 
@@ -162,7 +181,8 @@ class Surroundings {
     const CellTree& tree_;
     const Places& ghosts_;
     SortedPoints& own_;
-    const std::vector<K> keys_, ghostKeys_;
+    const SeenKeys<K>& allKeys_;
+    const std::vector<K>&keys_, &ghostKeys_;
     Cell cell_;
     uint32_t cellShift_ = 0;
 
