@@ -3,19 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/lanes.h"
 #include "engine/base/wide.h"
 #include "lod/primitives/triangle.h"
 
 namespace stipple::lod {
 namespace {
 
-constexpr size_t kAtOnce = 8;
 constexpr float kMostCells = 48;  ///< along an axis
 constexpr float kMostSquare = 1e38f, kMostDistance = 1e19f;
 constexpr uint64_t kMostItems = 16;  ///< a triangle, on average; needles that lie across the axes would be everywhere
-
-using Eight [[gnu::vector_size(4 * kAtOnce)]] = float;
-using EightAnywhere [[gnu::vector_size(4 * kAtOnce), gnu::may_alias, gnu::aligned(4)]] = float;
 
 }  // namespace
 
@@ -25,34 +22,30 @@ using EightAnywhere [[gnu::vector_size(4 * kAtOnce), gnu::may_alias, gnu::aligne
 STIPPLE_WIDE static float leastSquare(const TriangleGrid::Columns& columns, size_t first, size_t last,
                                       const float (&p)[3]) {
     const float px = p[0], py = p[1], pz = p[2];
-    Eight least = Eight{} + kMostSquare;
-    for (; first < last; first += kAtOnce) {
+    Floats least = Floats{} + kMostSquare;
+    for (; first < last; first += kLanes) {
         const auto* const at = columns.data();
-        const Eight ax = *reinterpret_cast<const EightAnywhere*>(at[0].data() + first),
-                    ay = *reinterpret_cast<const EightAnywhere*>(at[1].data() + first),
-                    az = *reinterpret_cast<const EightAnywhere*>(at[2].data() + first),
-                    bx = *reinterpret_cast<const EightAnywhere*>(at[3].data() + first),
-                    by = *reinterpret_cast<const EightAnywhere*>(at[4].data() + first),
-                    bz = *reinterpret_cast<const EightAnywhere*>(at[5].data() + first),
-                    cx = *reinterpret_cast<const EightAnywhere*>(at[6].data() + first),
-                    cy = *reinterpret_cast<const EightAnywhere*>(at[7].data() + first),
-                    cz = *reinterpret_cast<const EightAnywhere*>(at[8].data() + first);
-        const Eight abx = bx - ax, aby = by - ay, abz = bz - az, acx = cx - ax, acy = cy - ay, acz = cz - az;
-        const Eight apx = px - ax, apy = py - ay, apz = pz - az, bpx = px - bx, bpy = py - by, bpz = pz - bz,
-                    cpx = px - cx, cpy = py - cy, cpz = pz - cz;
-        const Eight d1 = abx * apx + aby * apy + abz * apz, d2 = acx * apx + acy * apy + acz * apz,
-                    d3 = abx * bpx + aby * bpy + abz * bpz, d4 = acx * bpx + acy * bpy + acz * bpz,
-                    d5 = abx * cpx + aby * cpy + abz * cpz, d6 = acx * cpx + acy * cpy + acz * cpz;
-        const Eight va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2, all = va + vb + vc;
-        const Eight alongB = d4 - d3, alongC = d5 - d6;
+        const Floats ax = floatsAt(at[0].data(), first).v, ay = floatsAt(at[1].data(), first).v,
+                     az = floatsAt(at[2].data(), first).v, bx = floatsAt(at[3].data(), first).v,
+                     by = floatsAt(at[4].data(), first).v, bz = floatsAt(at[5].data(), first).v,
+                     cx = floatsAt(at[6].data(), first).v, cy = floatsAt(at[7].data(), first).v,
+                     cz = floatsAt(at[8].data(), first).v;
+        const Floats abx = bx - ax, aby = by - ay, abz = bz - az, acx = cx - ax, acy = cy - ay, acz = cz - az;
+        const Floats apx = px - ax, apy = py - ay, apz = pz - az, bpx = px - bx, bpy = py - by, bpz = pz - bz,
+                     cpx = px - cx, cpy = py - cy, cpz = pz - cz;
+        const Floats d1 = abx * apx + aby * apy + abz * apz, d2 = acx * apx + acy * apy + acz * apz,
+                     d3 = abx * bpx + aby * bpy + abz * bpz, d4 = acx * bpx + acy * bpy + acz * bpz,
+                     d5 = abx * cpx + aby * cpy + abz * cpz, d6 = acx * cpx + acy * cpy + acz * cpz;
+        const Floats va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2, all = va + vb + vc;
+        const Floats alongB = d4 - d3, alongC = d5 - d6;
         const auto isBC = (va <= 0) & (alongB >= 0) & (alongC >= 0), isAC = (vb <= 0) & (d2 >= 0) & (d6 <= 0),
                    isAB = (vc <= 0) & (d1 >= 0) & (d3 <= 0);
         const auto isA = (d1 <= 0) & (d2 <= 0), isB = (d3 >= 0) & (d4 <= d3), isC = (d6 >= 0) & (d5 <= d6);
-        const Eight partB = isAB ? d1 : vb, wholeB = isAB ? d1 - d3 : all;
-        const Eight partC = isAC ? d2 : isBC ? alongB : vc, wholeC = isAC ? d2 - d6 : isBC ? alongB + alongC : all;
-        const Eight none = Eight{}, one = none + 1.0f;
-        const Eight shareB = wholeB > 0 ? partB / wholeB : none, shareC = wholeC > 0 ? partC / wholeC : none;
-        Eight b = isAC ? none : isBC ? one - shareC : shareB, c = shareC;
+        const Floats partB = isAB ? d1 : vb, wholeB = isAB ? d1 - d3 : all;
+        const Floats partC = isAC ? d2 : isBC ? alongB : vc, wholeC = isAC ? d2 - d6 : isBC ? alongB + alongC : all;
+        const Floats none = Floats{}, one = none + 1.0f;
+        const Floats shareB = wholeB > 0 ? partB / wholeB : none, shareC = wholeC > 0 ? partC / wholeC : none;
+        Floats b = isAC ? none : isBC ? one - shareC : shareB, c = shareC;
         b = isC ? none : b;
         c = isC ? one : c;
         b = isAB ? shareB : b;
@@ -61,13 +54,13 @@ STIPPLE_WIDE static float leastSquare(const TriangleGrid::Columns& columns, size
         c = isB ? none : c;
         b = isA ? none : b;
         c = isA ? none : c;
-        const Eight dx = px - (ax + b * abx + c * acx), dy = py - (ay + b * aby + c * acy),
-                    dz = pz - (az + b * abz + c * acz);
-        const Eight square = dx * dx + dy * dy + dz * dz;
+        const Floats dx = px - (ax + b * abx + c * acx), dy = py - (ay + b * aby + c * acy),
+                     dz = pz - (az + b * abz + c * acz);
+        const Floats square = dx * dx + dy * dy + dz * dz;
         least = square < least ? square : least;
     }
     float all = least[0];
-    for (size_t lane = 1; lane < kAtOnce; ++lane) all = std::min(all, least[lane]);
+    for (size_t lane = 1; lane < kLanes; ++lane) all = std::min(all, least[lane]);
     return all;
 }
 
@@ -132,7 +125,7 @@ void TriangleGrid::placeItems() {
     // (What stands behind the last is looked at with it.)
     std::array<float*, 9> to{};
     for (size_t k = 0; k < columns_.size(); ++k) {
-        columns_.at(k).resize(items_.size() + kAtOnce - 1);
+        columns_.at(k).resize(items_.size() + kLanes - 1);
         to.at(k) = columns_.at(k).data();
     }
     forCells([&](uint32_t t, uint32_t& at) {

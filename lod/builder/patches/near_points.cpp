@@ -3,18 +3,15 @@
 #include <algorithm>
 #include <limits>
 
+#include "engine/base/lanes.h"
 #include "engine/base/wide.h"
 
 namespace stipple::lod {
 namespace {
 
-using Lanes = float __attribute__((vector_size(32), aligned(4), may_alias));
-using Mask = int32_t __attribute__((vector_size(32), aligned(4), may_alias));
 constexpr float kFar = std::numeric_limits<float>::max();
 constexpr size_t kDeepest = 12, kWaiting = 8 * kDeepest;
 constexpr size_t kMostRanked = 64;  ///< points within a limit that are put in order at once
-
-const Lanes& lanes(const float* p) { return *reinterpret_cast<const Lanes*>(p); }
 
 /// Keeps the order by (distance, index).
 void insert(NearPoints::Found& f, size_t most, float squared, uint32_t index) {
@@ -37,21 +34,14 @@ struct Within {
     uint32_t count = 0;
 };
 
-/// Is any lane set?
-[[gnu::always_inline]] inline bool any(const Mask& mask) {
-    using Halves = int64_t __attribute__((vector_size(32)));
-    const auto m = __builtin_bit_cast(Halves, mask);
-    return ((m[0] | m[1]) | (m[2] | m[3])) != 0;
-}
-
 /// How many come before each: those that are nearer, and of equally far ones those that stand before it.
 [[gnu::always_inline]] inline void rank(Within& w) {
-    reinterpret_cast<Lanes&>(w.squared[w.count]) = Lanes{} + kFar;
+    floatsAt(&w.squared[w.count], 0).v = Floats{} + kFar;
     for (uint32_t i = 0; i < w.count; i += 8) {
-        const Lanes own = lanes(w.squared + i);
-        Mask nearer{};
+        const Floats own = floatsAt(w.squared + i, 0).v;
+        Lanes nearer{};
         for (uint32_t k = 0; k < w.count; ++k) nearer -= w.squared[k] < own;
-        reinterpret_cast<Mask&>(w.rank[i]) = nearer;
+        reinterpret_cast<Anywhere<Lanes>*>(w.rank + i)->v = nearer;
     }
     uint8_t taken[kMostRanked] = {};  // NOLINT
     for (uint32_t i = 0; i < w.count; ++i) w.rank[i] += taken[w.rank[i]]++;
@@ -119,8 +109,9 @@ STIPPLE_WIDE void NearPoints::search(const NearPoints& tree, const float (&p)[3]
         if (here.squared > limit) continue;
         if (here.level == 0) {
             const Leaf& leaf = tree.leaves_[here.node];
-            const Lanes x = lanes(leaf.at[0]) - p[0], y = lanes(leaf.at[1]) - p[1], z = lanes(leaf.at[2]) - p[2];
-            reinterpret_cast<Lanes&>(out) = x * x + y * y + z * z;
+            const Floats x = floatsAt(leaf.at[0], 0).v - p[0], y = floatsAt(leaf.at[1], 0).v - p[1],
+                         z = floatsAt(leaf.at[2], 0).v - p[2];
+            floatsAt(out, 0).v = x * x + y * y + z * z;
             for (uint32_t k = 0; k < 8; ++k) {
                 if (!(out[k] <= limit)) continue;
                 if (found.count == most && out[k] == found.squared[most - 1] &&
@@ -132,14 +123,14 @@ STIPPLE_WIDE void NearPoints::search(const NearPoints& tree, const float (&p)[3]
             continue;
         }
         const Node& node = tree.levels_[here.level - 1][here.node];
-        Lanes sum{};
+        Floats sum{};
         for (int a = 0; a < 3; ++a) {
-            const Lanes below = lanes(node.lo[a]) - p[a], above = p[a] - lanes(node.hi[a]);
-            Lanes d = below > above ? below : above;
-            d = d > 0.0f ? d : Lanes{};
+            const Floats below = floatsAt(node.lo[a], 0).v - p[a], above = p[a] - floatsAt(node.hi[a], 0).v;
+            Floats d = below > above ? below : above;
+            d = d > 0.0f ? d : Floats{};
             sum += d * d;
         }
-        reinterpret_cast<Lanes&>(out) = sum;
+        floatsAt(out, 0).v = sum;
         const size_t first = depth;
         for (uint32_t k = 0; k < 8; ++k) {
             if (!(out[k] <= limit)) continue;
@@ -169,14 +160,14 @@ STIPPLE_WIDE void NearPoints::searchRuns(const NearPoints& tree, const Box32& bo
             continue;
         }
         const Node& node = tree.levels_[here.level - 1][here.node];
-        Lanes sum{};
+        Floats sum{};
         for (int a = 0; a < 3; ++a) {
-            const Lanes below = lanes(node.lo[a]) - box.hi[a], above = box.lo[a] - lanes(node.hi[a]);
-            Lanes d = below > above ? below : above;
-            d = d > 0.0f ? d : Lanes{};
+            const Floats below = floatsAt(node.lo[a], 0).v - box.hi[a], above = box.lo[a] - floatsAt(node.hi[a], 0).v;
+            Floats d = below > above ? below : above;
+            d = d > 0.0f ? d : Floats{};
             sum += d * d;
         }
-        reinterpret_cast<Lanes&>(out) = sum;
+        floatsAt(out, 0).v = sum;
         for (uint32_t k = 8; k-- > 0;)
             if (out[k] <= limit) stack[depth++] = {here.level - 1, 8 * here.node + k};
     }
@@ -188,10 +179,11 @@ STIPPLE_WIDE void NearPoints::searchAmong(const NearPoints& tree, const Runs& ru
     float out[8];  // NOLINT
     for (size_t r = 0; r < runs.count; ++r) {
         const Leaf& leaf = tree.leaves_[runs.run[r]];
-        const Lanes x = lanes(leaf.at[0]) - p[0], y = lanes(leaf.at[1]) - p[1], z = lanes(leaf.at[2]) - p[2];
-        const Lanes squared = x * x + y * y + z * z;
-        if (!any(squared <= limit)) continue;
-        reinterpret_cast<Lanes&>(out) = squared;
+        const Floats x = floatsAt(leaf.at[0], 0).v - p[0], y = floatsAt(leaf.at[1], 0).v - p[1],
+                     z = floatsAt(leaf.at[2], 0).v - p[2];
+        const Floats squared = x * x + y * y + z * z;
+        if (!isAny(squared <= limit)) continue;
+        floatsAt(out, 0).v = squared;
         if (w.count + 8 > kMostRanked) keepNearest(w, most, limit);
         for (uint32_t k = 0; k < 8; ++k) {  // (without a branch: what is not within is written over)
             w.squared[w.count] = out[k];

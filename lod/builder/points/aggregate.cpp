@@ -6,10 +6,10 @@
 #include <bit>
 #include <cmath>
 
+#include "engine/base/lanes.h"
 #include "engine/base/numbers.h"
 #include "engine/base/wide.h"
 #include "lod/builder/points/covered.h"
-#include "lod/builder/points/lanes.h"
 #include "lod/primitives/octahedral.h"
 #include "shaders/shared/border.h"
 

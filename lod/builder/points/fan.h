@@ -5,7 +5,7 @@
 #include <array>
 #include <cstddef>
 
-#include "lod/builder/points/lanes.h"
+#include "engine/base/lanes.h"
 
 namespace stipple::lod {
 

@@ -1,7 +1,7 @@
 #include "lod/builder/points/inside.h"
 
+#include "engine/base/lanes.h"
 #include "engine/base/wide.h"
-#include "lod/builder/points/lanes.h"
 
 namespace stipple::lod {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "lod/builder/points/lanes.h"
+#include "engine/base/lanes.h"
 
 namespace stipple::lod {
 

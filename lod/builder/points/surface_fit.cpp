@@ -7,8 +7,8 @@
 #include <cstring>
 #include <limits>
 
+#include "engine/base/lanes.h"
 #include "engine/base/wide.h"
-#include "lod/builder/points/lanes.h"
 #include "lod/builder/points/select.h"
 
 namespace stipple::lod {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace stipple::lod {
+namespace stipple {
 
 inline constexpr size_t kLanes = 8;
 
@@ -41,4 +41,4 @@ struct [[gnu::packed, gnu::may_alias]] Anywhere {
     values = floatsAt(roots, 0).v;
 }
 
-}  // namespace stipple::lod
+}  // namespace stipple
