@@ -52,7 +52,7 @@ std::vector<dvec3> slab(Rng& rng, const Axes& axes, const dvec3& sizes, size_t c
 lod::Spread spreadOf(const std::vector<dvec3>& points, const dvec3& origin) {
     lod::Neighbourhood near;
     for (const dvec3& p : points) near.add(glm::vec3(p - origin));
-    std::vector<int32_t> squared(near.count + lod::kLanes, lod::kNothing);
+    std::vector<int32_t> squared(near.count + kLanes, lod::kNothing);
     const float from[3] = {0, 0, 0};
     lod::squaredDistances(near.x.data(), near.y.data(), near.z.data(), near.count, from, squared.data());
     return lod::spreadOf(near.neighbours(), from, squared.data(), 3e38f);
