@@ -71,6 +71,7 @@ struct EndPixels {
     static constexpr size_t kMost = 256;
     uint32_t segment[kMost + 2], pixel[kMost + 2], depth[kMost + 2];
 };
+static_assert(EndPixels::kMost + 2 <= LinePixels::kMost, "offerAll has room for these, too");
 
 /// How the segments of a block lie on the image as lines of one pixel's width, and which pixels their ends are.
 void layLines(const FrameConstants& frame, Lines& lines, size_t count) {
@@ -236,8 +237,8 @@ void drawFilledTube(const FrameConstants& f, const CameraSegment& c, uint64_t id
     const FilledCurve s = wideTube(f, c, id);
     const float left = min(s.left[0], s.left[1]), right = max(s.right[0], s.right[1]), top = min(s.top[0], s.top[1]),
                 bottom = max(s.bottom[0], s.bottom[1]);
-    if (left >= width || top >= height || right < 0.0f || bottom < 0.0f) return;
-    if (min(bottom - top, height) * min(right - left, width) > float(kLargePixels))
+    if (isBesidePicture(left, right, top, bottom, width, height) > 0.5f) return;
+    if (isLargeBox(left, right, top, bottom, width, height) > 0.5f)
         wide.keep(wide.context, s);
     else
         fillCurve(f, s, 0, int(f.height) - 1, visibility);

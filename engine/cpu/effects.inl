@@ -121,7 +121,8 @@ void backgroundRow(const FrameConstants& frame, const BackgroundConstants& const
         return mixTaps(t, backdropLight(texels[t.at00]), backdropLight(texels[t.at10]), backdropLight(texels[t.at01]),
                        backdropLight(texels[t.at11]));
     };
-    const auto show = [&](size_t i, const vec3& fine, const vec3& coarse, float between) __attribute__((always_inline)) {
+    const auto show = [&](size_t i, const vec3& fine, const vec3& coarse,
+                          float between) __attribute__((always_inline)) {
         const vec3 c = backdropShown(b, fine, coarse, between);
         row.behindRed[i] = c.x;
         row.behindGreen[i] = c.y;

@@ -124,6 +124,25 @@ struct TileDiscs {
     }
 };
 
+/// Where a thread's lie, once it has had a tile: were they thread-local themselves, every thread would have them from
+/// the start, six times (each instruction set and kind of view), in processes that only build, too.
+class DiscRoom {
+  public:
+    struct Batches {
+        DiscBatch discs[TileDiscs::kKept + 1];
+        FrontBatch fronts[TileDiscs::kKept + 1];
+        KernelBatch kernels[TileDiscs::kKept + 1];
+    };
+    DiscRoom() : batches_(new Batches{}) {}
+    ~DiscRoom() { delete batches_; }
+    DiscRoom(const DiscRoom&) = delete;
+    DiscRoom& operator=(const DiscRoom&) = delete;
+    Batches& batches() const { return *batches_; }
+
+  private:
+    Batches* const batches_;
+};
+
 /// A batch of them, from the `first` on.
 struct KeptBatch {
     const DiscBatch& discs;
@@ -252,10 +271,9 @@ void filterTile(const FrameConstants& frame, const Tables& tables, const BlockSo
                 const uint32_t* colours, const uint32_t* places, size_t count, const SplatTile& tile, bool wantsNormals,
                 const Visibility& visibility, FilteredPixel* filtered, const SecondPixels& seconds) {
     const FrameConstants f = frame;
-    static thread_local DiscBatch batches[TileDiscs::kKept + 1];
-    static thread_local FrontBatch fronts[TileDiscs::kKept + 1];
-    static thread_local KernelBatch kernels[TileDiscs::kKept + 1];
-    TileDiscs discs{splats, colours, places, count, batches, fronts, kernels, false};
+    static thread_local const DiscRoom room;
+    DiscRoom::Batches& batches = room.batches();
+    TileDiscs discs{splats, colours, places, count, batches.discs, batches.fronts, batches.kernels, false};
     prefetchDiscs(splats, places, count);
     const auto filter = !wantsNormals         ? filterDiscs<Wants::nothing>
                         : f.hasMaterials == 0 ? filterDiscs<Wants::normals>

@@ -7,6 +7,17 @@ constexpr float kHullMargin = 0.02f;  ///< px: by how much corners of ribbons ar
     return int(min(max(least, v), most));
 }
 
+/// Is a box beside the picture, does it cover much of it? (1 or 0, as conditions would keep GCC from SIMD.)
+[[gnu::always_inline]] inline float isBesidePicture(float left, float right, float top, float bottom, float width,
+                                                    float height) {
+    return max(max(left >= width ? 1.0f : 0.0f, top >= height ? 1.0f : 0.0f),
+               max(right < 0.0f ? 1.0f : 0.0f, bottom < 0.0f ? 1.0f : 0.0f));
+}
+[[gnu::always_inline]] inline float isLargeBox(float left, float right, float top, float bottom, float width,
+                                               float height) {
+    return min(bottom - top, height) * min(right - left, width) > float(kLargePixels) ? 1.0f : 0.0f;
+}
+
 /// Pixels that a curve may take, of all its rows: most are a few pixels wide, and side by side they are one group.
 struct FilledPixels {
     static constexpr uint32_t kMost = 256, kStretch = 8;
@@ -113,6 +124,7 @@ constexpr size_t kHullLines = 6, kHullFrom[kHullLines] = {0, 0, 0, 1, 1, 2}, kHu
 /// Columns of a group of rows from `firstRow` on.
 [[gnu::always_inline]] inline void hullRows(const HullLine* lines, float width, int firstRow,
                                             FilledRows& __restrict rows) {
+    static_assert(kHullLines == 6, "all of them are here");
     const HullLine a = lines[0], b = lines[1], c = lines[2], d = lines[3], e = lines[4], g = lines[5];
 #pragma GCC ivdep
     for (size_t r = 0; r < kRowGroup; ++r) {
@@ -177,7 +189,8 @@ struct PlacedRibbon {
 [[gnu::always_inline]] inline uint32_t nearestOf(const Ribbon& r) {
     const float a = r.a.z - std::fabs(r.w.z), b = r.a.z + r.along.z - std::fabs(r.w.z + r.turn.z);
     const float least = min(a, b) * r.unit;
-    return nearestBits(least, 1.0e-4f * r.unit + 1.0e-5f * std::fabs(least));
+    // A hit may lie kRibbonSlack beyond an edge: ten times that holds what rounding adds, too.
+    return nearestBits(least, 10.0f * kRibbonSlack * r.unit + kRibbonSlack * std::fabs(least));
 }
 
 /// Pixels of rows [first, last]; `rowsFrom` as of fillRowsOf.
@@ -238,7 +251,8 @@ void fillTubeRows(const FrameConstants& f, const FilledCurve& s, int firstRow, i
     const float nearPlane = f.nearPlane, width = float(int(f.width));
     const float za = tube.a.z - tube.radiusA, zb = tube.b.z - tube.radiusB;
     const float size = std::fabs(tube.a.z) + std::fabs(tube.b.z) + tube.radiusA + tube.radiusB;
-    // (Places along rays are found from where the ends lie, far to the side or not.)
+    // (Places along rays are found from where the ends lie, far to the side or not: za, oa and q of tubeHit round about
+    // 3e-7 of that.)
     const float aside = std::fabs(tube.a.x) + std::fabs(tube.a.y) + std::fabs(tube.b.x) + std::fabs(tube.b.y);
     fillRowsOf(
         f, s.id, first, last, nearestBits(min(za, zb), 1.0e-4f * size + 1.0e-6f * aside), visibility,

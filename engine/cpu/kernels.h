@@ -111,12 +111,12 @@ struct ProjectedBlock {
 
 /// The records of a block that claim a pixel, closed up.
 struct Claims {
-    static constexpr uint32_t kAhead =
-        48;  ///< pixels are scattered over 16 MB: so many before they are read they are asked for
+    /// Keys are scattered over the picture (16 MB at 1080p): so many pixels before they are read they are asked for.
+    static constexpr uint32_t kAhead = 48;
     uint32_t count;
-    alignas(64) uint32_t pixel[ProjectedBlock::kSize + kAhead];  ///< of as many behind the last, too
-    alignas(64) uint32_t depth[ProjectedBlock::kSize + kAhead];  ///< bits
-    alignas(64) uint32_t lane[ProjectedBlock::kSize + kAhead];   ///< of the block
+    alignas(64) uint32_t pixel[ProjectedBlock::kSize + kAhead];  ///< behind the last kAhead times the first
+    alignas(64) uint32_t depth[ProjectedBlock::kSize];           ///< bits
+    alignas(64) uint32_t lane[ProjectedBlock::kSize];            ///< of the block
 };
 
 struct BlockSource {

@@ -3,7 +3,7 @@
 // general register and back. Included by kernels.inl.
 constexpr uint32_t kWholeGroup = (1u << kTexelGroup) - 1u;
 
-#if defined(__AVX512F__)
+#if defined(__AVX512VL__)
 struct GroupInts {
     __m512i all;
 };
@@ -142,7 +142,7 @@ template <typename Use>
     }
 }
 
-#if defined(__AVX2__) && !defined(__AVX512F__)
+#if defined(__AVX2__) && !defined(__AVX512VL__)
 /// Of each set of eight lanes the numbers of those that are in it, a byte each, closed up. (BMI2 has instructions for
 /// that, which take hundreds of cycles before Zen 3.)
 struct ClosedUp {
@@ -162,7 +162,8 @@ constexpr ClosedUp kClosedUp;
 #endif
 
 /// Writes `first` + k for each k < lanes (1 to 8) whose key is no less than `least`, closed up, and says how many they
-/// are; all eight of `to` may be written. (Reads what other threads may be writing: either is right.)
+/// are; all eight of `to` may be written. (Reads what other threads may be writing: either is right, if no key is torn.
+/// It is assumed that lanes of 8 aligned bytes come whole.)
 #if defined(__AVX512VL__) && !defined(__SANITIZE_THREAD__)
 [[gnu::always_inline]] inline uint32_t keepFrom(const uint64_t* keys, uint32_t lanes, uint64_t least, uint32_t first,
                                                 uint32_t* to) {
@@ -218,7 +219,8 @@ constexpr uint32_t kPassedBy = ~0u;
         const __m256i d = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(depth + first));
         const auto there = static_cast<__mmask8>(
             (0xffu >> (8u - some)) & _mm256_cmpneq_epi32_mask(d, _mm256_set1_epi32(static_cast<int>(kPassedBy))));
-        const __m512i key = _mm512_or_si512(_mm512_maskz_slli_epi64(0xff, _mm512_maskz_cvtepu32_epi64(0xff, d), 33),
+        const __m512i bitsOfDepth = _mm512_maskz_cvtepu32_epi64(0xff, d),
+                      key = _mm512_or_si512(_mm512_maskz_slli_epi64(0xff, bitsOfDepth, kDrawIdBits),
                                             _mm512_set1_epi64(static_cast<long long>(id)));
         const __m512i read = _mm512_maskz_loadu_epi64(there, keys + first);
         bits |= uint32_t{_mm512_mask_cmplt_epu64_mask(there, key, read)} << first;
@@ -239,7 +241,7 @@ constexpr uint32_t kPassedBy = ~0u;
             _mm256_cvtepi32_epi64(_mm_cmpeq_epi32(d, _mm_set1_epi32(static_cast<int>(kPassedBy)))),
             _mm256_cmpgt_epi64(_mm256_set1_epi64x(static_cast<long long>(lanes - first)), places));
         if (_mm256_testz_si256(isSome, isSome) != 0) continue;
-        const __m256i key = _mm256_xor_si256(_mm256_slli_epi64(_mm256_cvtepu32_epi64(d), 33), ids);
+        const __m256i key = _mm256_xor_si256(_mm256_slli_epi64(_mm256_cvtepu32_epi64(d), int(kDrawIdBits)), ids);
         const __m256i read = _mm256_maskload_epi64(reinterpret_cast<const long long*>(keys + first), isSome);
         const __m256i isBefore =
             _mm256_and_si256(_mm256_cmpgt_epi64(_mm256_xor_si256(read, upper), key), isSome);
@@ -260,7 +262,7 @@ constexpr uint32_t kPassedBy = ~0u;
 #endif
 
 /// Which records claim a pixel is as good as random: they are closed up without branches.
-#if defined(__AVX512F__)
+#if defined(__AVX512VL__)
 void findClaims(const ProjectedBlock& block, uint32_t count, Claims& to) {
     const __m512i wide = _mm512_set1_epi32(static_cast<int>(kWidePixel));
     __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);

@@ -225,8 +225,9 @@ template <typename Number>
 void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, const Visibility& visibility) {
     const FillBox box = fillBox(f, t, firstRow, lastRow);
     if (box.fromX > box.toX || box.fromY > box.toY) return;
-    if (box.isSmall && box.toX - box.fromX < 8)
-        fill<int32_t, 8>(t, box, f.width, visibility);
+    constexpr int kNarrowGroup = 8;
+    if (box.isSmall && box.toX - box.fromX < kNarrowGroup)
+        fill<int32_t, kNarrowGroup>(t, box, f.width, visibility);
     else if (box.isSmall)
         fill<int32_t, 16>(t, box, f.width, visibility);
     else
@@ -327,7 +328,10 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
     float inverse[12];
     for (int i = 0; i < count; ++i) {
         const float scale = f.focal / lensDepth(lens, polygon[i].z);
-        const auto guarded = [](float p) { return min(max(-2.0f * kGuardPixels, p), 2.0f * kGuardPixels); };
+        // An edge's value: two products of an edge, which has both corners there, and a pixel's way from one of them.
+        constexpr double kCorner = 131072.0, kSide = 16384.0, kSteps = 256.0;  // 2 kGuardPixels, a picture, kSubpixel
+        static_assert(2.0 * (2.0 * kCorner * kSteps) * ((kCorner + kSide) * kSteps) < 0x1p53, "doubles hold it");
+        const auto guarded = [](float p) { return min(max(float(-kCorner), p), float(kCorner)); };
         x[i] = snapPixel(guarded(polygon[i].x * scale + f.centre.x));
         y[i] = snapPixel(guarded(polygon[i].y * scale + f.centre.y));
         inverse[i] = imageLinear(lens, polygon[i].z);

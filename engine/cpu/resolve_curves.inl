@@ -2,8 +2,8 @@
 
 /// Segments as stored, and their nodes, side by side: of runs of pixels, or one for each pixel.
 struct CurveSegments {
-    alignas(64) uint32_t words[8][kTile + kSpread];
-    alignas(64) float base[3][kTile + kSpread], axes[9][kTile + kSpread], edge[kTile + kSpread];
+    alignas(64) uint32_t words[8][kSpreadRow];
+    alignas(64) float base[3][kSpreadRow], axes[9][kSpreadRow], edge[kSpreadRow];
 };
 [[gnu::always_inline]] inline CurveSegment packedOf(const CurveSegments& e, size_t i) {
     return {{e.words[0][i], e.words[1][i], e.words[2][i], e.words[3][i]},
@@ -29,7 +29,7 @@ constexpr uint32_t kThinCurve = 0, kFilledRibbon = 1, kFilledTube = 2, kCurveKin
 /// Pixels of a kind.
 struct CurvesOfKind {
     uint32_t count = 0;
-    alignas(64) uint32_t from[kTile + kSpread];  ///< places in the row's list
+    alignas(64) uint32_t from[kSpreadRow];  ///< places in the row's list
     CurveSegments segments;
 };
 struct CurveTexels {

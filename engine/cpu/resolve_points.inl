@@ -246,8 +246,8 @@ struct TurnedPoints {
     alignas(64) uint32_t normal[kTile], octantMask[kTile], at[kTile + 1];
     alignas(64) float nx[kTile], ny[kTile], nz[kTile];
 };
-/// Normals of turned nodes (nodeUnitNormal); of others they are left as they are, and not taken (gatheredNormal). Far
-/// away each pixel is of another node.
+/// Normals of turned nodes; of others they are left as they are, and not taken (gatheredNormal). Far away each pixel is
+/// of another node.
 void turnNormals(uint32_t n, Gathered& g) {
     TurnedPoints t;
     uint32_t count = 0;
@@ -269,12 +269,10 @@ void turnNormals(uint32_t n, Gathered& g) {
         node.axisY = vec3(t.axes[3][k], t.axes[4][k], t.axes[5][k]);
         node.axisZ = vec3(t.axes[6][k], t.axes[7][k], t.axes[8][k]);
         node.octantMask = t.octantMask[k];
-        const vec3 turned = nodeNormal(node, octDecode(t.normal[k]));
-        const bool isBent = (node.octantMask & kNodeBent) != 0u;
-        const float shorten = 1.0f / std::sqrt(max(dot(turned, turned), 1.0e-37f));  // (always: no branch)
-        t.nx[k] = isBent ? turned.x * shorten : turned.x;
-        t.ny[k] = isBent ? turned.y * shorten : turned.y;
-        t.nz[k] = isBent ? turned.z * shorten : turned.z;
+        const vec3 turned = nodeUnitNormal(node, octDecode(t.normal[k]));
+        t.nx[k] = turned.x;
+        t.ny[k] = turned.y;
+        t.nz[k] = turned.z;
     }
     for (uint32_t k = 0; k < count; ++k) {
         g.nx[t.at[k]] = t.nx[k];

@@ -5,9 +5,9 @@
 
 /// What the weights mix, corner by corner.
 struct Corners {
-    alignas(64) float x[3][kTile + kSpread], y[3][kTile + kSpread], z[3][kTile + kSpread];
-    alignas(64) float u[3][kTile + kSpread], v[3][kTile + kSpread];
-    alignas(64) uint32_t normal[3][kTile + kSpread], colour[3][kTile + kSpread];
+    alignas(64) float x[3][kSpreadRow], y[3][kSpreadRow], z[3][kSpreadRow];
+    alignas(64) float u[3][kSpreadRow], v[3][kSpreadRow];
+    alignas(64) uint32_t normal[3][kSpreadRow], colour[3][kSpreadRow];
 };
 
 /// A material's properties at the pixels, and what the shading needs of the surface.
@@ -138,7 +138,7 @@ struct TriangleRow {
     MaterialRow material;
     UvRow uv;
     alignas(64) float wb[kTile], wc[kTile];  ///< weights of the second and third corner
-    alignas(64) uint32_t surface[kTile + kSpread];  ///< flags and material
+    alignas(64) uint32_t surface[kSpreadRow];  ///< flags and material
     alignas(64) float perpX[kTile], perpY[kTile];
     alignas(64) uint32_t word[kTile], emission[kTile];
 };

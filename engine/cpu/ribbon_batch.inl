@@ -41,6 +41,10 @@ static_assert(RibbonBatch::kWords == 22, "as these two have them");
     to.line[line][4][k] = h.least;
     to.line[line][5][k] = h.most;
 }
+[[gnu::always_inline]] inline HullLine lineAt(const RibbonBatch& of, size_t line, size_t k) {
+    return {of.line[line][0][k], of.line[line][1][k], of.line[line][2][k],
+            of.line[line][3][k], of.line[line][4][k], of.line[line][5][k]};
+}
 
 /// Where they lie: corners, lines between them, rows (none of those beside the picture).
 void placeRibbons(const FrameConstants& frame, const DrawNode& drawNode, const uint32_t* __restrict words,
@@ -66,6 +70,7 @@ void placeRibbons(const FrameConstants& frame, const DrawNode& drawNode, const u
             const size_t from = kHullFrom[l], to = kHullTo[l];
             setLine(batch, l, k, hullLine(p.x[from], p.y[from], p.x[to], p.y[to]));
         };
+        static_assert(kHullLines == 6, "a loop over them would keep GCC from SIMD");
         line(0);
         line(1);
         line(2);
@@ -73,10 +78,8 @@ void placeRibbons(const FrameConstants& frame, const DrawNode& drawNode, const u
         line(4);
         line(5);
         const float left = leastOf(p.x), right = mostOf(p.x), top = leastOf(p.y), bottom = mostOf(p.y);
-        const float isBeside = max(max(left > width ? 1.0f : 0.0f, top > height ? 1.0f : 0.0f),
-                                   max(right < 0.0f ? 1.0f : 0.0f, bottom < 0.0f ? 1.0f : 0.0f));
-        batch.isLarge[k] =
-            min(bottom - top, height) * min(right - left, width) > float(kLargePixels) ? 1.0f - isBeside : 0.0f;
+        const float isBeside = isBesidePicture(left, right, top, bottom, width, height);
+        batch.isLarge[k] = isLargeBox(left, right, top, bottom, width, height) * (1.0f - isBeside);
         batch.first[k] = firstRowOf(p.y, 0.0f, height - 1.0f);
         const int last = lastRowOf(p.y, 0.0f, height - 1.0f);
         batch.last[k] = isBeside > 0.5f ? -1 : last;
@@ -92,9 +95,7 @@ void fillBatch(const FrameConstants& frame, const DrawNode& node, const uint32_t
     placeRibbons(f, node, words, batch);
     const auto rowsFrom = [&](size_t k, int y, FilledRows& rows) __attribute__((always_inline)) {
         HullLine lines[kHullLines];
-        for (size_t l = 0; l < kHullLines; ++l)
-            lines[l] = {batch.line[l][0][k], batch.line[l][1][k], batch.line[l][2][k],
-                        batch.line[l][3][k], batch.line[l][4][k], batch.line[l][5][k]};
+        for (size_t l = 0; l < kHullLines; ++l) lines[l] = lineAt(batch, l, k);
         hullRows(lines, width, y, rows);
     };
     for (size_t k = 0; k < batch.count; ++k) {

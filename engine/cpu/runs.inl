@@ -16,10 +16,12 @@ void findRuns(const WinningPixels& p, PixelRuns& to) {
 }
 
 constexpr size_t kSpread = 8;  ///< entries that are written at once: as many lie behind the last of an array
+/// Entries of such an array: whole lines of 64 bytes, so that each of an array of them is aligned.
+constexpr size_t kSpreadRow = (kTile + kSpread + 15) / 16 * 16;
 /// `value` into the next of them. (Of a loop GCC makes eight stores.)
 template <typename T>
 [[gnu::always_inline]] inline void spread(T value, T* to) {
     typedef T Eight __attribute__((vector_size(kSpread * sizeof(T))));
-    const Eight all = value - Eight{};  // (value + Eight{} would make 0 of -0)
+    const Eight all = value - Eight{};  // (-0 may become 0, which is as good to all that read them)
     __builtin_memcpy(to, &all, sizeof all);
 }

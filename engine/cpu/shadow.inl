@@ -31,8 +31,8 @@ struct alignas(64) ShadowTaps {
     float red[kTile], green[kTile], blue[kTile];
 };
 
-/// Texels that are looked up: of each pixel the first one of four or the only one, and what is there; of four those side
-/// by side are read together.
+/// Texels that are looked up: of each pixel the first one of four or the only one, and what is there; of four those
+/// side by side are read together.
 struct alignas(64) ShadowReads {
     uint32_t at[kTile];
     float column[kTile], row[kTile], depth[kTile];

@@ -85,7 +85,7 @@ SHARED_FN vec3 nodeNormal(DrawNode node, vec3 n) {
 SHARED_FN vec3 nodeUnitNormal(DrawNode node, vec3 unit) {
     const vec3 n = nodeNormal(node, unit);
     const bool isBent = (node.octantMask & kNodeBent) != 0u;
-    const float shorten = isBent ? 1.0f / sqrt(max(n.x * n.x + n.y * n.y + n.z * n.z, 1.0e-37f)) : 1.0f;
+    const float shorten = 1.0f / sqrt(max(n.x * n.x + n.y * n.y + n.z * n.z, 1.0e-37f));  // (always: no branch)
     return vec3(isBent ? n.x * shorten : n.x, isBent ? n.y * shorten : n.y, isBent ? n.z * shorten : n.z);
 }
 

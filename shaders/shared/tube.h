@@ -37,8 +37,8 @@ SHARED_FN Tube tubeOf(vec3 a, vec3 b, float radiusA, float radiusB) {
 }
 
 struct TubeHit {
-    float depth;  // kFarAway: none
-    float place;  // on the segment, 0 to 1
+    float depth;  // kNoDepth: none
+    float place;  // on the segment, 0 to 1; of none: where the ray is nearest to the axis
     vec3 normal;  // unit, outwards
     float end;    // -1: of the ball at a, 1: at b, 0: of the cone
 };
@@ -72,8 +72,7 @@ SHARED_FN TubeHit tubeHit(Tube t, PixelRay ray, float nearPlane, bool isPlain) {
     const float e2 = ex * ex + ey * ey + 1.0f;
     const float inverseE2 = 1.0f / e2;
     const float dy = ex * t.axis.x + ey * t.axis.y + t.axis.z;
-    const float touchA = t.radiusA * t.sine;
-    const float touchB = t.span + t.radiusB * t.sine;
+    const float touchA = t.radiusA * t.sine, touchB = t.span + t.radiusB * t.sine;
     const float slack = 1.0e-4f * (t.radiusA + t.radiusB);  // no gap between balls and cone
     // Balls.
     const float za = (ex * endA.x + ey * endA.y + endA.z) * inverseE2;
@@ -129,7 +128,8 @@ SHARED_FN TubeHit tubeHit(Tube t, PixelRay ray, float nearPlane, bool isPlain) {
     const float onCone = cone0 < cone1 ? s0 : s1;
     const float y = y0 + onCone * dy;
     const float along = (y - touchA) / max(touchB - touchA, 1.0e-30f);
-    hit.place = isA ? 0.0f : isB ? 1.0f : min(max(along, 0.0f), 1.0f);
+    const float onSegment = isA ? 0.0f : isB ? 1.0f : min(max(along, 0.0f), 1.0f);
+    hit.place = hit.depth < kNoDepth ? onSegment : min(max(y0 / max(t.span, 1.0e-30f), 0.0f), 1.0f);
     hit.end = isA ? -1.0f : isB ? 1.0f : 0.0f;
     const float sa = hit.depth - za;
     const float sb = hit.depth - zb;

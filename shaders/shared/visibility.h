@@ -28,13 +28,14 @@ const uint kLaneBits = 8u;
 const uint kMostBlocks = 1u << 25;        // of a frame, all kinds
 const uint kMostBlocksOfKind = 1u << 24;  // so that a place within a kind has 32 bits
 
+const uint kDrawIdBits = 33u;          // of a key, below its depth
 const uint64_t kNoKey = ~uint64_t(0);  // nothing is seen
-const uint64_t kDrawIdMask = (uint64_t(1) << 33) - uint64_t(1);
+const uint64_t kDrawIdMask = (uint64_t(1) << kDrawIdBits) - uint64_t(1);
 
 // `place`: 256 * block + lane, counted from the first block of the kind on.
 SHARED_FN uint64_t drawId(uint firstBlock, uint place) { return (uint64_t(firstBlock) << kLaneBits) + uint64_t(place); }
-SHARED_FN uint64_t visibilityKey(uint depthBits, uint64_t id) { return uint64_t(depthBits) << 33 | id; }
-SHARED_FN uint keyDepthBits(uint64_t key) { return uint(key >> 33); }
+SHARED_FN uint64_t visibilityKey(uint depthBits, uint64_t id) { return uint64_t(depthBits) << kDrawIdBits | id; }
+SHARED_FN uint keyDepthBits(uint64_t key) { return uint(key >> kDrawIdBits); }
 SHARED_FN float keyDepth(uint64_t key) { return uintBitsToFloat(keyDepthBits(key)); }
 SHARED_FN uint keyBlock(uint64_t key) { return uint((key & kDrawIdMask) >> kLaneBits); }
 SHARED_FN uint keyLane(uint64_t key) { return uint(key) % kBlockLanes; }

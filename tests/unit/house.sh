@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # No file above 600 lines (above 500: said), no function above 80, a README.md in every folder with sources,
-# formatting as clang-format has it.
+# formatting as clang-format has it, and lines of at most 120 columns where it does not look (.inl).
 cd "$1" || exit 2
 status=0
 files=$(find engine lod streaming shaders apps tests -name '*.cpp' -o -name '*.h' -o -name '*.inl' -o -name '*.comp' -o -name '*.glsl')
@@ -24,6 +24,8 @@ long=$(count_functions $files | awk -v known="$(echo $known)" '
 for folder in $(dirname $files | sort -u); do
     [ -f "$folder/README.md" ] || [ -f "$(dirname "$folder")/README.md" ] || { echo "no README.md in $folder"; status=1; }
 done
+wide=$(printf '%s\n' $files | grep -E '\.inl$' | xargs awk 'length > 120 { print FILENAME ":" FNR ": " length }')
+[ -z "$wide" ] || { printf 'above 120 columns:\n%s\n' "$wide"; status=1; }
 if command -v clang-format >/dev/null; then
     clang-format --dry-run -Werror $(printf '%s\n' $files | grep -E '\.(cpp|h)$') 2>&1 | grep -E 'error:' | head -20
     [ "${PIPESTATUS[1]}" -ne 0 ] || status=1

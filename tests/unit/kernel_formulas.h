@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <vector>
 
 #include "engine/base/rng.h"
 #include "engine/cpu/kernels.h"
@@ -87,5 +90,43 @@ void forKernels(const Use& use) {
             use(orthographic ? *all[k]->orthographic : *all[k], frameOf(orthographic));
         }
 }
+
+inline uint32_t wordOf(Rng& rng) { return static_cast<uint32_t>(rng.below(uint64_t{1} << 32)); }
+/// Octahedral, of any direction.
+inline uint32_t directionOf(Rng& rng) {
+    return static_cast<uint32_t>(rng.below(65535)) | static_cast<uint32_t>(rng.below(65535)) << 16;
+}
+
+inline vec3 stretched(const vec3& v, float by) { return {v.x * by, v.y * by, v.z * by}; }
+inline vec3 plus(const vec3& a, const vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline vec3 minus(const vec3& a, const vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+
+/// Blocks of all kinds have their ids in places of their own, so that a wrong range is seen.
+inline FrameConstants withRanges(FrameConstants f) {
+    f.firstBlock.of[kKindCurves] = 3;
+    f.firstBlock.of[kKindTriangles] = 5;
+    f.firstBlock.of[kKindPatches] = 9;  // none
+    f.firstBlock.of[kKindDiscs] = 9;
+    f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
+    f.exactCurves = 2;
+    return f;
+}
+
+/// A row of pixels of one kind, resolved.
+struct Resolved {
+    std::vector<uint64_t> keys;
+    std::vector<uint32_t> surface = std::vector<uint32_t>(cpu::kTile);
+    float largest = 0;  ///< radius
+    std::unique_ptr<cpu::TexelRow> row = std::make_unique<cpu::TexelRow>();
+
+    void resolve(const cpu::Kernels& k, const FrameConstants& f, cpu::ResolveInput in, uint32_t x0, uint32_t y) {
+        const cpu::Tables tables = cpu::makeTables();
+        const std::array<cpu::ResolveKind, kKindNothing> none{};
+        in.ofKind = none.data();
+        row->hasTubes = true;
+        ASSERT_TRUE(k.resolveRow(f, tables, in, keys.data(), x0, y, static_cast<uint32_t>(keys.size()), *row, largest,
+                                 {surface.data(), nullptr, nullptr, nullptr}));
+    }
+};
 
 }  // namespace stipple::test

@@ -54,10 +54,10 @@ bool takeRow(const RowPlace& at, const SurfacePlanes& planes, const SurfaceWants
     row.hasCoverage = planes.coverage != nullptr;
     row.hasOcclusion = at.frame.draws->tableAt<shared::OcclusionConstants>(shared::kOcclusionBinding) != nullptr;
     if (!at.frame.k.takeRow(keptAt(at.frame, at.first), wants, at.n, row)) return false;
-    if (planes.surface != nullptr && planes.emissive != nullptr)
+    if (row.hasEmission)
         for (size_t i = 0; i < at.n; ++i)
             row.emission[i] = (row.material[i] & shared::kPixelTriangle) != 0 ? planes.emissive[i] : 0u;
-    if (planes.coverage != nullptr)
+    if (row.hasCoverage)
         for (size_t i = 0; i < at.n; ++i) row.coverage[i] = static_cast<float>(planes.coverage[i]) * (1.0f / 255.0f);
     return true;
 }
