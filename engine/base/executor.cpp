@@ -100,6 +100,7 @@ class ThreadExecutor final : public Executor {
 /// First in, first out, in memory that is kept: whoever starts tasks frame by frame allocates nothing.
 class Tasks {
   public:
+    Tasks() { tasks_.reserve(kAtOnce); }
     bool isEmpty() const { return next_ == tasks_.size(); }
     size_t size() const { return tasks_.size() - next_; }
     void push(std::function<void()> task) {
@@ -119,12 +120,14 @@ class Tasks {
     }
 
   private:
+    static constexpr size_t kAtOnce = 128;  // so many may wait before more memory is needed
     std::vector<std::function<void()>> tasks_;
     size_t next_ = 0;  ///< those before it were taken
 };
 
 /// Takes tasks that the threads of an arena should not: those of read(), and those of run() where the arena has one
-/// thread, which may be waiting for what they give. Threads come as tasks do, `most` of them.
+/// thread, which may be waiting for what they give. The `most` threads come with the first task: were they made one by
+/// one, as many tasks wait at once, a frame could have to make one long after the first.
 class SideThreads {
   public:
     explicit SideThreads(size_t most) : most_(most) {}
@@ -140,8 +143,9 @@ class SideThreads {
         {
             const std::lock_guard lock(mutex_);
             tasks_.push(std::move(task));
-            if (threads_.size() < most_ && busy_ + tasks_.size() > threads_.size()) try {
-                    threads_.emplace_back([this] { work(); });
+            if (threads_.size() < most_) try {
+                    threads_.reserve(most_);
+                    while (threads_.size() < most_) threads_.emplace_back([this] { work(); });
                 } catch (const std::system_error&) {  // none more are to be had
                 }
             if (!threads_.empty()) {
@@ -231,13 +235,11 @@ class TbbExecutor final : public Executor {
     ~TbbExecutor() noexcept override { TbbExecutor::wait(); }
     void parallelFor(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) override {
         if (count == 0) return;
-        arena_.execute([&] {
-            // Isolated: a thread that waits here must not pick up an unrelated long task.
-            tbb::this_task_arena::isolate([&] {
-                tbb::parallel_for(tbb::blocked_range<size_t>(0, count, grain ? grain : 1),
-                                  [&](const tbb::blocked_range<size_t>& r) { body(r.begin(), r.end()); });
-            });
-        });
+        // Isolated: a thread that waits here must not pick up an unrelated long task.
+        arena_.execute([&] { tbb::this_task_arena::isolate([&] { loop(count, grain ? grain : 1, body); }); });
+    }
+    void parallelForHelping(size_t count, const std::function<void(size_t, size_t)>& body) override {
+        if (count > 0) arena_.execute([&] { loop(count, 1, body); });
     }
     void run(std::function<void()> task) override {
         if (threads() == 1)
@@ -258,6 +260,10 @@ class TbbExecutor final : public Executor {
     int threads() const override { return arena_.max_concurrency(); }
 
   private:
+    static void loop(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) {
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, count, grain),
+                          [&](const tbb::blocked_range<size_t>& r) { body(r.begin(), r.end()); });
+    }
     static constexpr size_t kReaders = 4;  // as many requests as a disk or a connection has use for
     tbb::task_arena arena_;
     tbb::task_group group_;

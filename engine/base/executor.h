@@ -12,6 +12,11 @@ class Executor {
     virtual ~Executor() = default;
     /// Calls body(begin, end) over [0, count) in pieces of at least `grain`; returns when all are done.
     virtual void parallelFor(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) = 0;
+    /// The same one piece each, but whoever has none left helps with the loops inside of others' pieces while it waits,
+    /// and with whatever else the executor has to do, however long that takes: for the outermost loop of a long job.
+    virtual void parallelForHelping(size_t count, const std::function<void(size_t, size_t)>& body) {
+        parallelFor(count, 1, body);
+    }
     /// Starts `task` and returns. It must not throw.
     virtual void run(std::function<void()> task) = 0;
     /// Starts a task that waits for a disk or a network, where no thread of parallelFor has to wait for it. It may call

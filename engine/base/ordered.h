@@ -13,8 +13,9 @@
 namespace stipple {
 
 /// Calls make(i) for i in [first, end) on up to `workers` threads, and use(i, what it gave) one after the other in
-/// order. What is made waits in memory: a thread begins nothing more than `workers` items ahead of the last used one.
-/// Stops at the first error; what make or use throws is thrown to the caller, once all threads have stopped.
+/// order, beside what others make. What is made waits in memory: a thread begins nothing more than `workers` items
+/// ahead of the last used one; one that finds nothing left helps with loops inside of make. Stops at the first error;
+/// what make or use throws is thrown to the caller, once all threads have stopped.
 template <typename T, typename Make, typename Use>
 Result<void> inOrder(Executor& executor, int workers, size_t first, size_t end, const Make& make, const Use& use) {
     std::mutex mutex;
@@ -23,6 +24,7 @@ Result<void> inOrder(Executor& executor, int workers, size_t first, size_t end, 
     std::optional<Error> error;
     std::exception_ptr thrown;
     size_t next = first, used = first;
+    bool isUsing = false;
     const auto isOver = [&] { return error || thrown || next >= end; };
     const auto work = [&](std::unique_lock<std::mutex>& lock) {
         const size_t index = next++;
@@ -33,13 +35,20 @@ Result<void> inOrder(Executor& executor, int workers, size_t first, size_t end, 
             waiting.emplace(index, std::move(*made));
         else if (!error)
             error = made.error();
-        while (!error && !thrown && !waiting.empty() && waiting.begin()->first == used) {
+        while (!isUsing && !error && !thrown && !waiting.empty() && waiting.begin()->first == used) {
             auto item = waiting.extract(waiting.begin());
-            if (const Result<void> result = use(used, std::move(item.mapped())); !result) error = result.error();
+            isUsing = true;
+            lock.unlock();
+            const Result<void> result = use(item.key(), std::move(item.mapped()));
+            item = {};  // its memory
+            lock.lock();
+            isUsing = false;
+            if (!result && !error) error = result.error();
             ++used;
+            changed.notify_all();
         }
     };
-    executor.parallelFor(static_cast<size_t>(workers), 1, [&](size_t from, size_t to) {
+    executor.parallelForHelping(static_cast<size_t>(workers), [&](size_t from, size_t to) {
         for (size_t worker = from; worker < to; ++worker)
             for (;;) {
                 std::unique_lock lock(mutex);

@@ -34,11 +34,13 @@ class PointStages final : public BuildStages {
 
     Result<Planned> planMemory() override;
     uint64_t identity() const override;
-    Result<Distributed> distribute(Workspace& workspace, const Planned&, std::vector<Journal::Entry> left) override {
+    Result<Distributed> distribute(Workspace& workspace, const Planned& planned,
+                                   std::vector<Journal::Entry> left) override {
         workspace_ = &workspace;
         // Enough buckets for all, and the same ones whatever each machine has.
         spread_.emplace(input_, settings_, layout_,
-                        Distribution::Plan{course_.workers, bufferBytes_, leastOf(bucketPoints_), wantsEstimates()},
+                        Distribution::Plan{course_.workers, bufferBytes_, leastOf(bucketPoints_), wantsEstimates(),
+                                           !planned.isOnDisk},
                         workspace, course_.executor, course_.progress);
         STIPPLE_TRY(agree(settings_.ranks, spread_->run(left, course_.report, course_.clock)));
         std::erase_if(left, [](const Journal::Entry& e) { return e.what != Journal::What::done; });
@@ -196,8 +198,8 @@ class PointStages final : public BuildStages {
         return {};
     }
 
-    /// Threads that find no bucket left help with those that others work on (their seconds are not counted), unless the
-    /// memory allows only some of them.
+    /// Threads that find no bucket left help with those that others work on, unless the memory allows only some of
+    /// them.
     Executor& withinBucket() { return course_.workers < course_.executor.threads() ? *serial_ : course_.executor; }
     Result<BuiltBucket> buildBucket(size_t index) {
         const BucketPlan::Bucket& bucket = plan().buckets[index];
@@ -347,10 +349,13 @@ Result<Planned> PointStages::planMemory() {
     bufferBytes_ = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
     bucketPoints_ = bucketOf(isOnDisk ? room / 2 : room / 4);
     // Enough of them for all threads, but none smaller than a subtree; where nothing is estimated, and no bucket has to
-    // see what lies in others, more, which takes less memory.
+    // see what lies in others, more, which takes less memory. In memory so many that what is sorted at once stays in a
+    // cache, up to where what is on its way to them takes much memory itself.
+    constexpr uint64_t kMostBuckets = 1024;
     const uint64_t ranks = settings_.ranks == nullptr ? 1 : static_cast<uint64_t>(settings_.ranks->count());
-    bucketPoints_ = std::max<uint64_t>(
-        std::min<uint64_t>(bucketPoints_, n / ((wantsEstimates() ? 6u : 32u) * workers * ranks)), kSubtreePoints);
+    uint64_t buckets = (wantsEstimates() ? 6u : 32u) * workers * ranks;
+    if (!wantsEstimates() && !isOnDisk && settings_.ranks == nullptr) buckets = std::max(buckets, kMostBuckets);
+    bucketPoints_ = std::max<uint64_t>(std::min<uint64_t>(bucketPoints_, n / buckets), kSubtreePoints);
     return Planned{isOnDisk || settings_.ranks != nullptr};
 }
 

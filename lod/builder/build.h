@@ -66,6 +66,8 @@ struct BuildReport {
     uint64_t nodes = 0, records = 0, bytesOut = 0, contentHash = 0;
     PatchCounts patches;
     double seconds = 0;
+    /// Of the stages one after the other; "threads: ...": of all threads together, within "build", but for what those
+    /// do that help with the bucket of another.
     std::map<std::string, double> stageSeconds;
     uint64_t temporaryBytes = 0;  ///< on disk, at most
     bool isResumed = false;

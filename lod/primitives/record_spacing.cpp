@@ -41,7 +41,10 @@ float recordSpacing(std::span<const shared::PointRecord> records) {
     // behind the last are too far from anything.)
     thread_local std::vector<float> xs, ys, zs;
     const size_t padded = (n + kLanesOfSpacing - 1) / kLanesOfSpacing * kLanesOfSpacing;
-    for (auto* column : {&xs, &ys, &zs}) column->assign(padded, 1e9f);
+    for (auto* column : {&xs, &ys, &zs}) {
+        column->resize(padded);
+        std::fill(column->begin() + static_cast<ptrdiff_t>(n), column->end(), 1e9f);
+    }
     for (size_t k = 0; k < n; ++k) {
         xs[k] = static_cast<float>(shared::recordX(records[k]));
         ys[k] = static_cast<float>(shared::recordY(records[k]));
@@ -62,6 +65,8 @@ float recordSpacing(std::span<const shared::PointRecord> records) {
             for (; (first = blockWithin({xs.data(), ys.data(), zs.data()}, first, end, place, limit)) < end;
                  first += kLanesOfSpacing) {
                 for (size_t k = first; k < std::min(n, first + kLanesOfSpacing); ++k) {
+                    const float fx = xs[k] - place[0], fy = ys[k] - place[1], fz = zs[k] - place[2];
+                    if (fx * fx + fy * fy + fz * fz > limit) continue;
                     const int64_t dx = shared::recordX(records[k]) - x, dy = shared::recordY(records[k]) - y,
                                   dz = shared::recordZ(records[k]) - z;
                     const int64_t squared = dx * dx + dy * dy + dz * dz;

@@ -30,8 +30,7 @@ bool isAboveLeaves(const Hierarchy& h, const Node& node) {
     return !node.isLeaf();
 }
 
-std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize) {
-    std::vector<Disc> discs;
+void addDiscs(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize, std::vector<Disc>& discs) {
     const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
     const glm::dvec3 base = h.recordOrigin(node);
     for (size_t i = 0; i < chunk.records.size(); ++i) {
@@ -49,6 +48,11 @@ std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chu
             d.cell.at(static_cast<size_t>(a)) = static_cast<uint64_t>(std::max(d.place[a], 0.0) / clusterSize);
         discs.push_back(d);
     }
+}
+std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize) {
+    std::vector<Disc> discs;
+    discs.reserve(chunk.records.size());
+    addDiscs(h, node, chunk, clusterSize, discs);
     return discs;
 }
 
@@ -241,19 +245,26 @@ Result<uint64_t> measureErrorsAt(const Store& store, uint32_t index, const Chunk
     std::sort(records.begin(), records.end(), isLess);
     // Discs are rounded to fp32 in between.
     const double rounding = 1e-6 * h.cellSize(node);
-    std::vector<Disc> leaves;
+    std::vector<double> bounds(records.size());
+    for (size_t i = 0; i < records.size(); ++i) bounds[i] = h.errors.decode(records[i].code);
+    // (What a chunk holds it says itself: what the table says of one that is damaged may be anything.)
+    std::vector<Chunk> below;
+    size_t count = 0;
     for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c) {
-        STIPPLE_ASSIGN(const Chunk below, readChunk(store, c, true));
-        const std::vector<Disc> more = discsOf(h, h.nodes[c], below, clusterSize);
-        leaves.insert(leaves.end(), more.begin(), more.end());
+        STIPPLE_ASSIGN(Chunk child, readChunk(store, c, true));
+        count += child.records.size();
+        below.push_back(std::move(child));
     }
+    std::vector<Disc> leaves;
+    leaves.reserve(count);
+    for (uint32_t c = 0; c < children; ++c) addDiscs(h, h.nodes[node.firstChild + c], below[c], clusterSize, leaves);
     for (const Disc& leaf : leaves) {
         // A cell may have several records, for several cones of normals: one of them stands for the leaf.
         auto at = std::lower_bound(records.begin(), records.end(), leaf, isLess);
         double off = 1e300, error = 0;
         bool isUnbounded = false;
         for (; at != records.end() && at->cell == leaf.cell; ++at) {
-            const double distance = distanceOf(*at, leaf), bound = h.errors.decode(at->code);
+            const double distance = distanceOf(*at, leaf), bound = bounds[static_cast<size_t>(at - records.begin())];
             isUnbounded = isUnbounded || at->code >= ErrorScale::kLargest;
             if (distance - bound >= off - error) continue;
             off = distance;
@@ -268,7 +279,7 @@ Result<uint64_t> measureErrorsAt(const Store& store, uint32_t index, const Chunk
     const LeafGrid grid(std::move(leaves), node, 1u << (clusterLevel - node.level));
     const size_t stride = records.size() / most + 1;
     for (size_t i = 0; i < records.size(); i += stride) {
-        const double error = h.errors.decode(records[i].code), enough = error * (1 + 1e-5) + rounding;
+        const double error = bounds[i], enough = error * (1 + 1e-5) + rounding;
         const double off = farthestPlace(records[i], 2, 16, enough, [&](const glm::dvec3& place) {
             return grid.distance(place, records[i].cell, !records[i].hasNormal, enough);
         });

@@ -18,25 +18,41 @@ struct RecordFacts {
     std::array<double, 2> radii;
 };
 
-RecordFacts factsOf(const Hierarchy& h, const Node& node, const Payload& payload, const Chunk& chunk, size_t i) {
-    const double step = std::exp2(payload.stepShift), edge = h.cellSize(node);
-    const glm::dvec3 base = h.recordOrigin(node, payload);
-    if (chunk.segments.empty()) {
-        const shared::PointRecord& r = chunk.records[i];
-        const glm::dvec3 p = base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
-        const double radius = edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
-        return {shared::recordErrorCode(r), 1u << shared::recordOctant(r), {p, p}, {radius, radius}};
+/// What a node's records hold.
+class NodeRecords {
+  public:
+    NodeRecords(const Hierarchy& h, const Node& node, const Payload& payload, const Chunk& chunk)
+        : chunk_(chunk),
+          step_(std::exp2(payload.stepShift)),
+          edge_(h.cellSize(node)),
+          base_(h.recordOrigin(node, payload)) {}
+    uint32_t codeOf(size_t i) const {
+        return chunk_.segments.empty() ? shared::recordErrorCode(chunk_.records[i])
+                                       : shared::segmentErrorCode(chunk_.segments[i]);
     }
-    const shared::CurveSegment& s = chunk.segments[i];
-    RecordFacts facts{shared::segmentErrorCode(s), shared::segmentOctants(s), {}, {}};
-    for (size_t k = 0; k < 2; ++k) {
-        const shared::CurveVertex& v = k == 0 ? s.a : s.b;
-        facts.places.at(k) =
-            base + step * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
-        facts.radii.at(k) = edge * static_cast<double>(shared::curveRadius(v, 1.0f));
+    RecordFacts factsOf(size_t i) const {
+        if (chunk_.segments.empty()) {
+            const shared::PointRecord& r = chunk_.records[i];
+            const glm::dvec3 p = base_ + step_ * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
+            const double radius = edge_ * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
+            return {codeOf(i), 1u << shared::recordOctant(r), {p, p}, {radius, radius}};
+        }
+        const shared::CurveSegment& s = chunk_.segments[i];
+        RecordFacts facts{codeOf(i), shared::segmentOctants(s), {}, {}};
+        for (size_t k = 0; k < 2; ++k) {
+            const shared::CurveVertex& v = k == 0 ? s.a : s.b;
+            facts.places.at(k) =
+                base_ + step_ * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
+            facts.radii.at(k) = edge_ * static_cast<double>(shared::curveRadius(v, 1.0f));
+        }
+        return facts;
     }
-    return facts;
-}
+
+  private:
+    const Chunk& chunk_;
+    double step_, edge_;
+    glm::dvec3 base_;
+};
 
 glm::dvec3 coneAxis(const Node& node) { return glm::normalize(glm::dvec3(shared::octDecode(node.normalCone))); }
 double coneAngle(const Node& node) { return std::acos(std::min(double{node.normalConeCosine}, 1.0)); }
@@ -56,10 +72,11 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     const Payload& payload = h.payload(index);
     const uint32_t number = h.nodeOf(index);
     const Node& node = h.nodes[number];
+    const NodeRecords records(h, node, payload, chunk);
     std::array<uint32_t, 256> own{};
     uint32_t largest = 0;
     for (size_t i = 0; i < payload.records; ++i) {
-        const RecordFacts r = factsOf(h, node, payload, chunk, i);
+        const RecordFacts r = records.factsOf(i);
         ++own.at(r.code);
         largest = std::max(largest, r.code);
         for (size_t k = 0; k < 2; ++k)
@@ -102,7 +119,7 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
             code == 0 ? payload.records
                       : h.countGreater(payload.parentCounts, payload.records, static_cast<uint32_t>(code) - 1);
         for (; position < atLeast; ++position)
-            if (factsOf(h, node, payload, chunk, position).code > static_cast<uint32_t>(code))
+            if (records.codeOf(position) > static_cast<uint32_t>(code))
                 return "a record has a larger error than its parent record";
     }
     return {};

@@ -8,10 +8,12 @@
 #include <numeric>
 
 #include "apps/study/metrics/masks.h"
+#include "engine/base/lanes.h"
 #include "engine/base/rng.h"
 #include "engine/reference/decode.h"
 #include "lod/builder/points/aggregate.h"
 #include "lod/builder/points/covered.h"
+#include "lod/builder/points/select.h"
 #include "lod/builder/points/surface_fit.h"
 #include "lod/cut/view.h"
 #include "tests/support/drawn_discs.h"
@@ -291,7 +293,8 @@ TEST(Estimates, OpposingNormalsLeaveARecordWithANormal) {
         grid.edge = 65536;
         grid.cellSteps = 1024;
         const lod::Around around(grid, 0, 48, nullptr, {});
-        const lod::AggregateRecord one = lod::mergeAggregates(grid, parts, nullptr, around);
+        lod::AggregateRecord one;
+        lod::mergeAggregates(grid, parts, nullptr, around, one);
         ASSERT_NEAR(glm::length(one.normal), 1, 1e-5);
         ASSERT_LT(lineAngle(dvec3(one.normal), axes.n), 0.01);
         ASSERT_TRUE(std::isfinite(one.radius) && std::isfinite(one.above) && std::isfinite(one.below));

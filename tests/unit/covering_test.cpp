@@ -1,29 +1,36 @@
-// What a fan of rays calls covered is covered, wherever one looks; and what lies in a box, and in a cell, is what
-// looking at one after the other says.
+// What a fan of rays calls covered is covered, wherever one looks, and how far it reaches is what one circle, ray and
+// corner after the other says.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 #include <memory>
+#include <utility>
+#include <vector>
 
+#include "engine/base/lanes.h"
+#include "engine/base/rng.h"
 #include "lod/builder/points/fan.h"
-#include "lod/builder/points/inside.h"
-#include "lod/builder/points/seen.h"
-#include "tests/support/support.h"
 
 namespace stipple::lod {
 namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
+constexpr float kNarrowest = 0.99518f;  ///< cosine of half the angle between two rays, cut off
 
+void addCircle(Rng& rng, double radius, double most, Circles& circles) {
+    const auto any = [&](double from, double to) { return static_cast<float>(radius * rng.uniform(from, to)); };
+    const float u = any(-1.3, 1.3), v = any(-1.3, 1.3);
+    circles.add(u, v, any(0.05, most));
+}
 /// Circles of all sizes around a disc, some beside it; of one kind in three those of even samples.
 void fillCircles(Rng& rng, double radius, int kind, Circles& circles) {
     circles.count = 0;
     const auto count = static_cast<size_t>(rng.uniform(1, kind == 2 ? 120 : 40));
     const double most = kind == 0 ? 1.6 : kind == 1 ? 0.9 : 0.5;
-    for (size_t k = 0; k < count; ++k)
-        circles.add(static_cast<float>(radius * rng.uniform(-1.3, 1.3)),
-                    static_cast<float>(radius * rng.uniform(-1.3, 1.3)),
-                    static_cast<float>(radius * rng.uniform(0.05, most)));
+    for (size_t k = 0; k < count; ++k) addCircle(rng, radius, most, circles);
 }
 /// Places of the disc, many on its rim, that no circle holds when each is wider by `wider`.
 size_t openPlaces(Rng& rng, const Circles& circles, double radius, double wider) {
@@ -86,7 +93,7 @@ struct PlainFan {
     std::array<float, kRays> held{};
     float radius, rim;
 
-    explicit PlainFan(float r) : radius(r), rim(r / 0.99518f) {
+    explicit PlainFan(float r) : radius(r), rim(r / kNarrowest) {
         for (size_t k = 0; k <= kRays; ++k) {
             c.at(k) = static_cast<float>(std::cos(kTwoPi * static_cast<double>(k) / kRays));
             s.at(k) = static_cast<float>(std::sin(kTwoPi * static_cast<double>(k) / kRays));
@@ -115,7 +122,28 @@ struct PlainFan {
             }
         return most;
     }
+    bool isHeldBetween(size_t k, const Circles& circles, size_t i) const {
+        return farthestSquared(k, circles.u[i], circles.v[i]) < circles.radius[i] * circles.radius[i];
+    }
+    float missing(const Circles& circles) const {
+        float most = 0;
+        for (size_t k = 0; k < kRays; ++k) {
+            if (held.at(k) >= rim) continue;
+            float lacks = 3e38f;
+            for (size_t i = 0; i < circles.count; ++i)
+                lacks = std::min(lacks, std::sqrt(farthestSquared(k, circles.u[i], circles.v[i])) - circles.radius[i]);
+            most = std::max(most, lacks);
+        }
+        return most;
+    }
 };
+/// Between rays k and k + 1, in the middle of the rim's chord.
+void expectBetween(size_t k, float u, float v, float radius) {
+    const double half = 0.5 * kTwoPi / Fan::kRays, angle = (2 * static_cast<double>(k) + 1) * half,
+                 out = static_cast<double>(radius) * std::cos(half), most = 1e-6 * static_cast<double>(radius);
+    EXPECT_NEAR(static_cast<double>(u), out * std::cos(angle), most) << "between rays, the " << k << "th";
+    EXPECT_NEAR(static_cast<double>(v), out * std::sin(angle), most) << "between rays, the " << k << "th";
+}
 
 TEST(Covering, FansAreWhatOneCircleAfterTheOtherMakesOfThem) {
     Rng rng(35);
@@ -126,47 +154,90 @@ TEST(Covering, FansAreWhatOneCircleAfterTheOtherMakesOfThem) {
         fillCircles(rng, static_cast<double>(radius), round % 3, *circles);
         PlainFan plain(radius);
         for (size_t i = 0; i < circles->count; ++i) plain.add(circles->u[i], circles->v[i], circles->radius[i]);
-        ASSERT_EQ(Fan(radius).addAll(*circles), plain.least() * 0.99518f) << round;
+        ASSERT_EQ(Fan(radius).addAll(*circles), plain.least() * kNarrowest) << round;
         Fan fan(radius);
         ASSERT_EQ(fan.add(*circles), plain.least() >= plain.rim) << round;
         if (plain.least() >= plain.rim) continue;
-        // Each part between two rays is tried with a run of them that begins and ends anywhere.
-        std::vector<Circles::Range> tried;
-        const bool isClosed = fan.close(*circles, [&](float, float) {
-            const size_t from = rng.below(circles->count + 1), to = from + rng.below(circles->count - from + 1);
-            return tried.emplace_back(Circles::Range{from, to});
+        // Each part between two rays is tried with a run of them that begins and ends anywhere, or is new.
+        struct Tried {
+            float u, v;
+            Circles::Range range;
+        };
+        std::vector<Tried> tried;
+        const bool isClosed = fan.close(*circles, [&](float u, float v) {
+            const bool isNew = rng.below(4) == 0;
+            const size_t from = isNew ? circles->count : rng.below(circles->count + 1);
+            for (uint64_t more = isNew ? 1 + rng.below(3) : 0; more > 0; --more)
+                addCircle(rng, static_cast<double>(radius), 1.6, *circles);
+            const size_t to = isNew ? circles->count : from + rng.below(circles->count - from + 1);
+            return tried.emplace_back(Tried{u, v, {from, to}}).range;
         });
         size_t next = 0;
         for (size_t k = 0; k < Fan::kRays; ++k) {
             if (plain.held.at(k) >= plain.rim) continue;
             ASSERT_LT(next, tried.size()) << "asked for once an open part";
-            const Circles::Range range = tried[next++];
-            const auto isHeldBy = [&](size_t i) {
-                return plain.farthestSquared(k, circles->u[i], circles->v[i]) < circles->radius[i] * circles->radius[i];
-            };
-            for (size_t i = range.first; i < range.last; ++i)
-                if (isHeldBy(i)) {
-                    plain.held.at(k) = plain.rim;
-                    ++closed;
-                    break;
-                }
+            const auto& [u, v, range] = tried[next++];
+            expectBetween(k, u, v, radius);
+            for (size_t i = range.first; i < range.last; ++i) {
+                if (!plain.isHeldBetween(k, *circles, i)) continue;
+                plain.held.at(k) = plain.rim;
+                ++closed;
+                break;
+            }
         }
         ASSERT_EQ(next, tried.size()) << round;
         ASSERT_EQ(isClosed, plain.least() >= plain.rim) << round;
-        float most = 0;
-        for (size_t k = 0; k < Fan::kRays; ++k) {
-            if (plain.held.at(k) >= plain.rim) continue;
-            float least = 3e38f;
-            for (size_t i = 0; i < circles->count; ++i)
-                least = std::min(
-                    least, std::sqrt(plain.farthestSquared(k, circles->u[i], circles->v[i])) - circles->radius[i]);
-            most = std::max(most, least);
-        }
+        const float most = plain.missing(*circles);
         ASSERT_EQ(fan.missing(*circles), most) << round;
         missed += most > 0 ? 1 : 0;
     }
     EXPECT_GT(closed, 1000u);
     EXPECT_GT(missed, 1000u);
+}
+
+TEST(Covering, CirclesAreAskedForWhereTheyAreWanted) {
+    Rng rng(38);
+    const auto circles = std::make_unique<Circles>();
+    for (int round = 0; round < 200; ++round) {
+        const auto radius = static_cast<float>(std::exp2(rng.uniform(-10, 17)));
+        // Around those places, each of circles that just reach the centre holds all between its rays.
+        for (const float share : {1.001f, 0.99f}) {
+            circles->count = 0;
+            Fan fan(radius);
+            EXPECT_EQ(share > 1, fan.close(*circles, [&](float u, float v) {
+                circles->add(u, v, share * radius);
+                return Circles::Range{circles->count - 1, circles->count};
+            })) << round;
+            EXPECT_EQ(circles->count, Fan::kRays) << "an open part each";
+            EXPECT_EQ(share > 1, fan.missing(*circles) == 0) << round;
+        }
+    }
+}
+
+TEST(Covering, TheLastOfAsManyAsThereIsRoomForCounts) {
+    constexpr size_t kMost = Circles::kMost;
+    static_assert(std::tuple_size_v<Circles::Column> >= kMost + kLanes - 1, "a vector may begin at the last of them");
+    const auto circles = std::make_unique<Circles>();
+    for (size_t k = 0; k < kMost; ++k) circles->add(5, 5, 0.01f);  // beside the disc
+    for (size_t k = kMost; k < circles->u.size(); ++k) {           // what lies there is none of them
+        circles->u.at(k) = circles->v.at(k) = 0;
+        circles->radius.at(k) = 100;
+    }
+    Fan open(1);
+    ASSERT_FALSE(open.add(*circles));
+    const auto closes = [&](size_t first, size_t last) {
+        return Fan(1).close(*circles, [&](float, float) { return Circles::Range{first, last}; });
+    };
+    for (size_t first = kMost - 2 * kLanes; first <= kMost; ++first) EXPECT_FALSE(closes(first, kMost)) << first;
+    EXPECT_EQ(open.missing(*circles), PlainFan(1).missing(*circles));
+    circles->u.at(kMost - 1) = circles->v.at(kMost - 1) = 0;
+    circles->radius.at(kMost - 1) = 2;
+    for (size_t first = kMost - 2 * kLanes; first < kMost; ++first) {
+        EXPECT_TRUE(closes(first, kMost)) << first;
+        EXPECT_FALSE(closes(first, kMost - 1)) << first;
+    }
+    EXPECT_EQ(open.missing(*circles), 0);
+    EXPECT_TRUE(open.add(*circles));
 }
 
 TEST(Covering, MoreCirclesThanThereIsRoomForAreLeftOut) {
@@ -176,139 +247,9 @@ TEST(Covering, MoreCirclesThanThereIsRoomForAreLeftOut) {
     circles->count = 0;
     circles->add(0, 0, 0);
     circles->add(0, 0, -1);
+    circles->add(0, 0, std::numeric_limits<float>::quiet_NaN());
     EXPECT_EQ(circles->count, 0u);
     EXPECT_FALSE(Fan(1).add(*circles));
-}
-
-TEST(Inside, IsWhatLookingAtEachSays) {
-    Rng rng(32);
-    constexpr uint32_t kMost = UINT32_MAX;
-    size_t all = 0, none = 0;
-    for (int round = 0; round < 4000; ++round) {
-        const auto count = static_cast<size_t>(rng.uniform(0, 700)), begin = std::min<size_t>(count, rng.below(20));
-        std::array<std::vector<uint32_t>, 3> place;
-        // Few different ones, all there are, and both ends of what 32 bits hold.
-        const auto any = [&]() -> uint32_t {
-            switch (round % 3) {
-                case 0:
-                    return static_cast<uint32_t>(rng.below(12));
-                case 1:
-                    return static_cast<uint32_t>(rng.below(uint64_t{1} << 32));
-                default:
-                    return rng.below(2) == 0 ? static_cast<uint32_t>(rng.below(9))
-                                             : kMost - static_cast<uint32_t>(rng.below(9));
-            }
-        };
-        for (auto& column : place)
-            for (size_t k = 0; k < count; ++k) column.push_back(any());
-        LatticeBox box;
-        for (size_t a = 0; a < 3; ++a) {
-            const int64_t from = any(), to = any();
-            box.lo[a] = std::min(from, to) - (rng.below(4) == 0 ? int64_t{1} << 33 : 0);
-            box.hi[a] = std::max(from, to) + (rng.below(4) == 0 ? int64_t{1} << 33 : 0);
-            if (rng.below(30) == 0) box.lo[a] = box.hi[a] = rng.below(2) == 0 ? -5 : int64_t{1} << 34;  // holds nothing
-        }
-        std::vector<size_t> expected, found;
-        for (size_t i = begin; i < count; ++i)
-            if (box.holds(place[0][i], place[1][i], place[2][i])) expected.push_back(i);
-        forInside({place[0].data(), place[1].data(), place[2].data()}, begin, count, box,
-                  [&](size_t i) { found.push_back(i); });
-        ASSERT_EQ(found, expected) << "round " << round;
-        all += expected.size();
-        none += expected.empty() ? 1 : 0;
-    }
-    EXPECT_GT(all, 50'000u);
-    EXPECT_GT(none, 500u);
-}
-
-template <typename K>
-void expectRanges(uint64_t seed, int bits) {
-    Rng rng(seed);
-    for (int round = 0; round < 60; ++round) {
-        // Clumps far apart, as surfaces have them; sometimes one key, or none.
-        std::vector<Key> keys;
-        const auto clumps = rng.below(5);
-        for (uint64_t c = 0; c < clumps; ++c) {
-            const Key at = static_cast<Key>(rng.below(uint64_t{1} << 62)) << (bits - 62);
-            const auto shift = round % 4 == 0 ? 0 : rng.below(30);  // (all equal)
-            const auto count = round % 3 == 0 ? 1 : rng.below(4000);
-            for (uint64_t k = 0; k < count; ++k) keys.push_back(at + static_cast<Key>(rng.below(1u << shift)));
-        }
-        std::sort(keys.begin(), keys.end());
-        const SortedKeys<K> sorted{keys};
-        ASSERT_EQ(sorted.all().size(), keys.size());
-        for (int k = 0; k < 3000; ++k) {
-            const auto shift = static_cast<uint32_t>(rng.below(static_cast<uint64_t>(bits) + 1));
-            // Beside one that is there, or anywhere.
-            K key = static_cast<K>(rng.below(uint64_t{1} << 62)) << (bits - 62);
-            if (!keys.empty() && k % 4 != 0)
-                key = static_cast<K>(keys[rng.below(keys.size())]) + static_cast<K>(rng.below(3)) - 1;
-            const K lo = key >> shift << shift, last = lo | ((K{1} << shift) - 1);
-            const auto first = std::lower_bound(sorted.all().begin(), sorted.all().end(), lo),
-                       end = std::upper_bound(first, sorted.all().end(), last);
-            const KeyRange range = sorted.range(key, shift);
-            ASSERT_EQ(range.second - range.first, static_cast<size_t>(end - first)) << round << ", shift " << shift;
-            if (first != end) ASSERT_EQ(range.first, static_cast<size_t>(first - sorted.all().begin()));
-        }
-    }
-}
-/// inverseExtents of all neighbours, one after the other.
-std::array<float, kDirections> plainExtents(const std::vector<glm::vec3>& all, const glm::vec3& from,
-                                            const glm::vec3& axis, const glm::vec3& across) {
-    constexpr std::array<float, 8> kCosines{1, 0.92387953f,  0.70710678f,  0.38268343f,
-                                            0, -0.38268343f, -0.70710678f, -0.92387953f},
-        kSines{0, 0.38268343f, 0.70710678f, 0.92387953f, 1, 0.92387953f, 0.70710678f, 0.38268343f};
-    std::array<float, kDirections> most{};
-    for (const glm::vec3& p : all) {
-        const glm::vec3 d = p - from;
-        const float squared = glm::dot(d, d), u = glm::dot(d, axis), v = glm::dot(d, across), flat = u * u + v * v;
-        if (!(squared > 0) || !(flat > 0) || flat < 0.5f * squared) continue;
-        const float inverse = 1 / std::sqrt(flat * squared);
-        for (size_t k = 0; k < 8; ++k) {
-            const float along = kCosines.at(k) * (u * inverse) + kSines.at(k) * (v * inverse);
-            most.at(k) = std::max(most.at(k), along);
-            most.at(k + 8) = std::max(most.at(k + 8), -along);
-        }
-    }
-    return most;
-}
-
-TEST(SurfaceFit, ExtentsAreThoseOfAllNeighboursAsFarAsTheyCount) {
-    Rng rng(36);
-    size_t counted = 0, farOnes = 0;
-    for (int round = 0; round < 20'000; ++round) {
-        std::vector<glm::vec3> all;
-        Neighbourhood neighbours;
-        const auto count = 1 + rng.below(120);
-        const float thickness = round % 2 == 0 ? 0.02f : 0.6f;
-        for (uint64_t k = 0; k < count; ++k) {
-            const auto any = [&] { return static_cast<float>(rng.uniform(-1.5, 1.5)); };
-            all.emplace_back(any(), any(), thickness * any());
-            if (k > 0 && rng.below(20) == 0) all.back() = all[rng.below(k)];  // a copy
-            neighbours.add(all.back());
-        }
-        const glm::vec3 from = all[rng.below(count)], axis(1, 0, 0), across(0, 1, 0);
-        const auto most = static_cast<float>(std::exp2(rng.uniform(-3, 2)));
-        const auto found = inverseExtents(neighbours.neighbours(), {from.x, from.y, from.z}, axis, across, most);
-        const auto expected = plainExtents(all, from, axis, across);
-        const float floor = 0.499f / most;
-        for (size_t k = 0; k < kDirections; ++k) {
-            if (expected.at(k) >= floor) {
-                ++counted;
-                ASSERT_EQ(found.at(k), expected.at(k)) << round << ", direction " << k;
-            } else {
-                ++farOnes;
-                ASSERT_LT(found.at(k), floor) << round << ", direction " << k;
-            }
-        }
-    }
-    EXPECT_GT(counted, 50'000u);
-    EXPECT_GT(farOnes, 10'000u);
-}
-
-TEST(SortedKeys, RangesAreThoseOfASearchAmongAll) {
-    expectRanges<uint64_t>(33, 63);
-    expectRanges<Key>(34, 96);
 }
 
 }  // namespace

@@ -62,6 +62,50 @@ TEST(InOrder, WhatMakeOrUseThrowsReachesTheCallerInsteadOfStoppingForEver) {
                 }
 }
 
+TEST(InOrder, OthersAreMadeWhileOneIsUsed) {
+    // The first is used until both of the others are made, which takes both threads in turn.
+    ASSERT_TRUE(endsSoon([] {
+        const auto executor = makeTbbExecutor(2);
+        std::atomic<int> made{0};
+        std::atomic<bool> isUsing{false};
+        const auto result = inOrder<int>(
+            *executor, 2, 0, 3, [&](size_t i) -> Result<int> { return static_cast<int>(i) + 0 * made++; },
+            [&](size_t i, int) -> Result<void> {
+                EXPECT_FALSE(isUsing.exchange(true)) << "two at once";
+                while (i == 0 && made < 3) std::this_thread::yield();
+                isUsing = false;
+                return {};
+            });
+        EXPECT_TRUE(result);
+    }));
+}
+
+TEST(InOrder, WhoeverHasNothingLeftHelpsInsideOfOthers) {
+    // Of two items one is there at once; the other is two pieces that wait for each other, so that both threads are
+    // needed: whichever of them, the caller or the worker, has the first.
+    for (int round = 0; round < 20; ++round) {
+        ASSERT_TRUE(endsSoon([] {
+            const auto executor = makeTbbExecutor(2);
+            std::atomic<int> together{0}, begun{0};
+            const auto result = inOrder<int>(
+                *executor, 2, 0, 2,
+                [&](size_t i) -> Result<int> {
+                    ++begun;
+                    while (begun < 2) std::this_thread::yield();  // each has one
+                    if (i == 0) return 0;
+                    executor->parallelFor(2, 1, [&](size_t, size_t) {
+                        ++together;
+                        while (together < 2) std::this_thread::yield();
+                    });
+                    return 1;
+                },
+                [](size_t, int) -> Result<void> { return {}; });
+            EXPECT_TRUE(result);
+        })) << "round "
+            << round;
+    }
+}
+
 TEST(Executor, TasksMakeProgressWhileTheCallerWaitsForThemWhateverItsThreads) {
     for (const int threads : {1, 2, 4}) {
         ASSERT_TRUE(endsSoon([=] {

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <vector>
 
+#include "engine/base/lanes.h"
 #include "lod/builder/points/select.h"
 #include "tests/support/support.h"
 

@@ -59,9 +59,7 @@ STIPPLE_WIDE static float leastSquare(const TriangleGrid::Columns& columns, size
         const Floats square = dx * dx + dy * dy + dz * dz;
         least = square < least ? square : least;
     }
-    float all = least[0];
-    for (size_t lane = 1; lane < kLanes; ++lane) all = std::min(all, least[lane]);
-    return all;
+    return leastOf(least);
 }
 
 TriangleGrid::TriangleGrid(const std::vector<glm::vec3>& position, const std::vector<uint32_t>& indices, bool wantsEach)

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/base/check.h"
+#include "engine/base/wide.h"
 
 namespace stipple::lod {
 namespace {
@@ -13,6 +14,26 @@ constexpr double kPointsPerCell = 16384;  ///< of the first level, if the points
 constexpr uint32_t kLargestFirstLevel = 7;
 
 }  // namespace
+
+STIPPLE_WIDE static void makeCodes(const uint32_t* x, const uint32_t* y, const uint32_t* z, size_t count, uint32_t drop,
+                                   uint64_t* codes) {
+    for (size_t k = 0; k < count; ++k) codes[k] = shortMortonCode(x[k] >> drop, y[k] >> drop, z[k] >> drop);
+}
+
+STIPPLE_WIDE static void splitCodes(const uint64_t* codes, size_t count, uint32_t shift, uint32_t* to) {
+    for (size_t k = 0; k < count; ++k) to[k] = static_cast<uint32_t>(compactShort(codes[k] >> shift));
+}
+
+void placesOfShortKeys(const uint64_t* keys, size_t count, uint32_t* x, uint32_t* y, uint32_t* z) {
+    splitCodes(keys, count, 0, x);
+    splitCodes(keys, count, 1, y);
+    splitCodes(keys, count, 2, z);
+}
+
+void makeShortKeys(const Frame& frame, const uint32_t* x, const uint32_t* y, const uint32_t* z, size_t count,
+                   uint64_t* keys) {
+    makeCodes(x, y, z, count, frame.rootLog2 - frame.keyLevels, keys);
+}
 
 CellTree::CellTree(const Frame& frame, uint64_t points) : frame_(frame) {
     const double level = std::round(0.5 * std::log2(std::max(static_cast<double>(points) / kPointsPerCell, 1.0)));
@@ -28,8 +49,8 @@ void CellTree::count(const Coordinates& block) {
     const auto flush = [&] {
         if (run > 0) std::atomic_ref(entries_[last]).fetch_add(run, std::memory_order_relaxed);
     };
-    for (size_t i = 0; i < block.size(); ++i) {
-        const size_t place = placeOf(frame_.keyOf(block.at(i)), [&](size_t e) {
+    forEachKey(frame_, block, [&](size_t, auto key) {
+        const size_t place = placeOf(key, [&](size_t e) {
             return std::atomic_ref(entries_[e]).load(std::memory_order_relaxed);  // others count too
         });
         if (place != last) {
@@ -38,7 +59,7 @@ void CellTree::count(const Coordinates& block) {
             run = 0;
         }
         ++run;
-    }
+    });
     flush();
 }
 
@@ -90,8 +111,10 @@ void CellTree::addUp(const std::function<void(std::vector<uint32_t>&)>& sum) {
 }
 
 void CellTree::expect(const Coordinates& sample, uint64_t share) {
+    // (A sample of few points says too little of a cell that is about as full as it may be: to count all points again
+    // takes longer than to count some cells in eight parts.)
     do count(sample);
-    while (split(kSubtreePoints / share));
+    while (split(std::max<uint64_t>(kSubtreePoints * 3 / 4 / share, 1)));
     for (uint32_t& e : entries_)
         if ((e & kBlock) == 0) e = 0;
 }

@@ -35,6 +35,27 @@ struct Coordinates {
     Place at(size_t i) const { return placeOf(x[i], y[i], z[i], high.empty() ? 0 : high[i]); }
 };
 
+constexpr size_t kKeysAtOnce = 256;
+/// Frame::keyOf of up to so many points whose coordinates are 32 bits, by SIMD; the frame's keys must be short.
+void makeShortKeys(const Frame& frame, const uint32_t* x, const uint32_t* y, const uint32_t* z, size_t count,
+                   uint64_t* keys);
+/// The other way, where a key is the whole place.
+void placesOfShortKeys(const uint64_t* keys, size_t count, uint32_t* x, uint32_t* y, uint32_t* z);
+/// Calls use(i, key of point i) in order; keys are of 64 bits where the frame's are short.
+template <typename Use>
+void forEachKey(const Frame& frame, const Coordinates& of, const Use& use) {
+    if (frame.keyLevels > kShortBits || !of.high.empty()) {
+        for (size_t i = 0; i < of.size(); ++i) use(i, frame.keyOf(of.at(i)));
+        return;
+    }
+    std::array<uint64_t, kKeysAtOnce> keys;
+    for (size_t first = 0; first < of.size(); first += keys.size()) {
+        const size_t count = std::min(keys.size(), of.size() - first);
+        makeShortKeys(frame, of.x.data() + first, of.y.data() + first, of.z.data() + first, count, keys.data());
+        for (size_t k = 0; k < count; ++k) use(first + k, keys[k]);
+    }
+}
+
 /// The root's cell split evenly into cells of a first level; where those hold more than kSubtreePoints, they are split
 /// again. Counted again after each split, until nothing is left to split.
 class CellTree {
@@ -60,7 +81,8 @@ class CellTree {
     std::vector<Subtree> subtrees() const;
     /// Number of the cell that holds `key`; kNone where there are no points.
     static constexpr uint32_t kNone = 0x7fffffffu;
-    uint32_t cellOf(Key key) const {
+    template <typename K>
+    uint32_t cellOf(K key) const {
         return entries_[placeOf(key, [&](size_t i) { return entries_[i]; })];
     }
     uint32_t deepestLevel() const { return deepest_; }
@@ -76,8 +98,8 @@ class CellTree {
     uint64_t collapse(size_t first, uint32_t entries, uint32_t level);
     void findSubtrees(size_t begin, size_t end, uint32_t level, std::vector<Subtree>& subtrees) const;
     /// `load(i)`: entry i.
-    template <typename Load>
-    size_t placeOf(Key key, const Load& load) const {
+    template <typename K, typename Load>
+    size_t placeOf(K key, const Load& load) const {
         auto place = static_cast<size_t>(key >> firstShift_);
         uint32_t entry = load(place);
         for (uint32_t shift = firstShift_; (entry & kBlock) != 0; entry = load(place)) {

@@ -9,8 +9,9 @@
 namespace stipple::lod {
 namespace {
 
-constexpr float kFar = std::numeric_limits<float>::max();
-constexpr size_t kDeepest = 12, kWaiting = 8 * kDeepest;
+constexpr float kFarAway = std::numeric_limits<float>::max();
+constexpr size_t kMostLevels = 12, kWaiting = 8 * kMostLevels;
+static_assert(kLanes == 8);         // points of a run, children of a node
 constexpr size_t kMostRanked = 64;  ///< points within a limit that are put in order at once
 
 /// Keeps the order by (distance, index).
@@ -28,16 +29,16 @@ void insert(NearPoints::Found& f, size_t most, float squared, uint32_t index) {
 
 /// Squared distances of points within a limit, in the order of the points.
 struct Within {
-    alignas(32) float squared[kMostRanked + 8];  // NOLINT: set as far as they are read
-    alignas(32) uint32_t rank[kMostRanked + 8];  // NOLINT
-    uint32_t index[kMostRanked + 8];             // NOLINT
+    alignas(32) float squared[kMostRanked + kLanes];  // NOLINT: set as far as they are read
+    alignas(32) uint32_t rank[kMostRanked + kLanes];  // NOLINT
+    uint32_t index[kMostRanked + kLanes];             // NOLINT
     uint32_t count = 0;
 };
 
 /// How many come before each: those that are nearer, and of equally far ones those that stand before it.
 [[gnu::always_inline]] inline void rank(Within& w) {
-    floatsAt(&w.squared[w.count], 0).v = Floats{} + kFar;
-    for (uint32_t i = 0; i < w.count; i += 8) {
+    floatsAt(&w.squared[w.count], 0).v = Floats{} + kFarAway;
+    for (size_t i = 0; i < w.count; i += kLanes) {
         const Floats own = floatsAt(w.squared + i, 0).v;
         Lanes nearer{};
         for (uint32_t k = 0; k < w.count; ++k) nearer -= w.squared[k] < own;
@@ -65,11 +66,11 @@ struct Within {
 NearPoints::NearPoints(const std::vector<glm::dvec3>& points) : count_(points.size()) {
     leaves_.resize((count_ + 7) / 8);
     for (Leaf& leaf : leaves_)
-        for (auto& axis : leaf.at) std::fill(std::begin(axis), std::end(axis), kFar);
+        for (auto& axis : leaf.at) std::fill(std::begin(axis), std::end(axis), kFarAway);
     for (size_t i = 0; i < count_; ++i)
         for (int a = 0; a < 3; ++a) leaves_[i / 8].at[a][i % 8] = static_cast<float>(points[i][a]);
     struct Box {
-        std::array<float, 3> lo{kFar, kFar, kFar}, hi{-kFar, -kFar, -kFar};
+        std::array<float, 3> lo{kFarAway, kFarAway, kFarAway}, hi{-kFarAway, -kFarAway, -kFarAway};
     };
     std::vector<Box> boxes(leaves_.size());
     for (size_t i = 0; i < count_; ++i)
@@ -103,7 +104,7 @@ STIPPLE_WIDE void NearPoints::search(const NearPoints& tree, const float (&p)[3]
     Waiting stack[kWaiting];  // NOLINT: set as far as it is read
     size_t depth = 0;
     stack[depth++] = {0, static_cast<uint32_t>(tree.levels_.size()), 0};
-    float out[8];  // NOLINT
+    float out[kLanes];  // NOLINT
     while (depth > 0) {
         const Waiting here = stack[--depth];
         if (here.squared > limit) continue;
@@ -150,7 +151,7 @@ STIPPLE_WIDE void NearPoints::searchRuns(const NearPoints& tree, const Box32& bo
     runs.count = 0;
     runs.isWhole = true;
     stack[depth++] = {static_cast<uint32_t>(tree.levels_.size()), 0};
-    float out[8];  // NOLINT
+    float out[kLanes];  // NOLINT
     while (depth > 0) {
         const Waiting here = stack[--depth];
         if (here.level == 0) {
@@ -176,7 +177,7 @@ STIPPLE_WIDE void NearPoints::searchRuns(const NearPoints& tree, const Box32& bo
 STIPPLE_WIDE void NearPoints::searchAmong(const NearPoints& tree, const Runs& runs, const float (&p)[3], size_t most,
                                           float limit, Found& found) {
     Within w;
-    float out[8];  // NOLINT
+    float out[kLanes];  // NOLINT
     for (size_t r = 0; r < runs.count; ++r) {
         const Leaf& leaf = tree.leaves_[runs.run[r]];
         const Floats x = floatsAt(leaf.at[0], 0).v - p[0], y = floatsAt(leaf.at[1], 0).v - p[1],
@@ -184,7 +185,7 @@ STIPPLE_WIDE void NearPoints::searchAmong(const NearPoints& tree, const Runs& ru
         const Floats squared = x * x + y * y + z * z;
         if (!isAny(squared <= limit)) continue;
         floatsAt(out, 0).v = squared;
-        if (w.count + 8 > kMostRanked) keepNearest(w, most, limit);
+        if (w.count + kLanes > kMostRanked) keepNearest(w, most, limit);
         for (uint32_t k = 0; k < 8; ++k) {  // (without a branch: what is not within is written over)
             w.squared[w.count] = out[k];
             w.index[w.count] = 8 * runs.run[r] + k;
@@ -211,13 +212,13 @@ void NearPoints::runsNear(const glm::dvec3& lo, const glm::dvec3& hi, float limi
         box.lo[a] = static_cast<float>(lo[a]);
         box.hi[a] = static_cast<float>(hi[a]);
     }
-    searchRuns(*this, box, std::min(limit, kFar), runs);
+    searchRuns(*this, box, std::min(limit, kFarAway), runs);
 }
 
 void NearPoints::find(const Runs& runs, const glm::dvec3& p, size_t most, float limit, Found& found) const {
     const float at[3] = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
     if (runs.isWhole)
-        searchAmong(*this, runs, at, std::min(most, kMost), std::min(limit, kFar), found);
+        searchAmong(*this, runs, at, std::min(most, kMost), std::min(limit, kFarAway), found);
     else
         find(p, most, limit, found);
 }
@@ -226,7 +227,7 @@ void NearPoints::find(const glm::dvec3& p, size_t most, float limit, Found& foun
     found.count = 0;
     if (count_ == 0 || most == 0) return;
     const float at[3] = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
-    search(*this, at, std::min(most, kMost), std::min(limit, kFar), found);
+    search(*this, at, std::min(most, kMost), std::min(limit, kFarAway), found);
 }
 
 }  // namespace stipple::lod

@@ -56,7 +56,6 @@ struct SixteenthTable {
     }
 };
 const SixteenthTable kSixteenths;
-uint32_t byteOf(float srgb) { return unitToByte(srgb); }
 
 template <typename Part>
 bool hasNormal(const Part& r) {
@@ -170,10 +169,6 @@ STIPPLE_WIDE static float reachOfNarrow(const Points& leaves, size_t begin, size
 
 namespace {
 
-struct Extent {
-    float reach = 0, inner = 0, above = 0, below = 0;
-};
-
 /// Axes of a disc's plane.
 struct Plane {
     glm::vec3 n, t1, t2;
@@ -274,9 +269,6 @@ STIPPLE_WIDE static void addLeafDiscs(const LeafDiscs& discs, const Plane& plane
     floatsAt(extent.reach.data(), 0).v = reach;
 }
 
-namespace {
-
-/// Of the leaves themselves.
 Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const AggregateRecord& out) {
     Extent e;
     if (!hasNormal(out)) {  // a ball has no plane
@@ -293,6 +285,8 @@ Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const Aggr
     extent.giveTo(e);
     return e;
 }
+
+namespace {
 
 /// Of the leaves of all parts, against the disc's plane through out.place.
 Extent extentOf(std::span<const AggregateRecord> parts, const AggregateRecord& out) {
@@ -373,10 +367,11 @@ void complete(const RecordGrid& grid, std::span<const AggregateRecord> parts, co
     const auto inNode =
         static_cast<uint64_t>(cluster) & (uint64_t{grid.cellsAcross} * grid.cellsAcross * grid.cellsAcross - 1);
     const std::array<uint64_t, 3> index{compactShort(inNode), compactShort(inNode >> 1), compactShort(inNode >> 2)};
+    const double stepsPerUnit = 1 / grid.step;  // exact
     for (int a = 0; a < 3; ++a) {
         const auto at = static_cast<size_t>(a);
         const uint32_t first = static_cast<uint32_t>(index[at]) * grid.cellSteps;
-        const double wanted = std::floor((out.mean[a] - grid.base[a]) / grid.step + 0.5);
+        const double wanted = std::floor((out.mean[a] - grid.base[a]) * stepsPerUnit + 0.5);
         q[at] = toWhole<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
         out.place[a] = grid.base[a] + grid.step * q[at];
     }
@@ -391,7 +386,8 @@ void complete(const RecordGrid& grid, std::span<const AggregateRecord> parts, co
         out.above = x.above * (1 + 1e-5f);
         out.below = x.below * (1 + 1e-5f);
         const double sideways = std::max(0.0, radius - static_cast<double>(x.inner));
-        error = std::hypot(static_cast<double>(std::max(out.above, out.below)), sideways) * (1 + 1e-5);
+        const auto slab = static_cast<double>(std::max(out.above, out.below));
+        error = std::sqrt(slab * slab + sideways * sideways) * (1 + 1e-5);
     } else {
         out.inner = 0;
         error = out.count == 1 ? 0.0 : coveringErrorOfBall(out, parts, leaves);
@@ -400,35 +396,35 @@ void complete(const RecordGrid& grid, std::span<const AggregateRecord> parts, co
         out.inner = leaves == nullptr ? parts[0].inner : hasNormal(out) ? leaves->points.radius[out.first] : 0.0f;
         error = glm::length(out.mean - out.place) + radius - static_cast<double>(out.inner);
     }
-    const glm::vec3 colour(shared::srgbFromLinear(out.meanColour.x), shared::srgbFromLinear(out.meanColour.y),
-                           shared::srgbFromLinear(out.meanColour.z));
-    if (colourSpread(out, colour) > kColourSpread) error = std::max(error, 2 * radius);
+    std::array<uint32_t, 3> colour{out.least[0], out.least[1], out.least[2]};  // of all of them, if of one
+    if (out.least != out.greatest) {
+        const glm::vec3 mean(shared::srgbFromLinear(out.meanColour.x), shared::srgbFromLinear(out.meanColour.y),
+                             shared::srgbFromLinear(out.meanColour.z));
+        if (colourSpread(out, mean) > kColourSpread) error = std::max(error, 2 * radius);
+        colour = {unitToByte(mean.x), unitToByte(mean.y), unitToByte(mean.z)};
+    }
     out.code = std::max(static_cast<uint8_t>(grid.errors.encodeUp(error)), out.code);
     if (out.count > 1) out.code = static_cast<uint8_t>(coveringCode(out, around, out.code));
     out.packed = {q[0] | q[1] << 16, q[2] | radiusCode << 16 | uint32_t{out.code} << 24, normalCode,
-                  byteOf(colour.x) | byteOf(colour.y) << 8 | byteOf(colour.z) << 16 | uint32_t{out.flags} << 24};
+                  colour[0] | colour[1] << 8 | colour[2] << 16 | uint32_t{out.flags} << 24};
 }
 
 }  // namespace
 
-AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
-                                const Around& around) {
-    AggregateRecord out;
+void mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
+                     const Around& around, AggregateRecord& out) {
     out.key = parts[0].key;
     addUp(
         parts.size(), [&](size_t i) -> const AggregateRecord& { return parts[i]; }, out);
     complete(grid, parts, leaves, around, out);
-    return out;
 }
 
-AggregateRecord mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, size_t end,
-                            const Around& around) {
-    AggregateRecord out;
+void mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, size_t end, const Around& around,
+                 AggregateRecord& out) {
     out.key = leaves.key[begin];
     addUp(
         end - begin, [&](size_t i) { return LeafPart(leaves, begin + i); }, out);
     complete(grid, {}, &leaves, around, out);
-    return out;
 }
 
 bool splitByNormals(std::span<const AggregateRecord> parts, std::vector<uint8_t>& side) {

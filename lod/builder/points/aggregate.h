@@ -10,7 +10,7 @@ class Around;
 /// Where the records of one inner node may lie.
 struct RecordGrid {
     glm::dvec3 base{0};         ///< lattice position of coordinate 0
-    double step = 1, edge = 1;  ///< lattice units a step, and of the node's cell
+    double step = 1, edge = 1;  ///< lattice units a step, and of the node's cell; powers of two
     uint32_t clusterShift = 0;  ///< key bits below a cluster's cell
     uint32_t cellsAcross = 1;   ///< clusters along the node's edge
     uint32_t cellSteps = 1;     ///< steps of one cluster's cell
@@ -37,17 +37,25 @@ class RadiusCodes {
     uint32_t code_ = 0;
 };
 
+/// How far leaves' discs reach from a record's place, over and under the plane of its disc, and in every direction of
+/// that plane at least (`inner`).
+struct Extent {
+    float reach = 0, inner = 0, above = 0, below = 0;
+};
+/// Of the leaves [begin, end), one at least; of a record without a normal only `reach`: that of their balls.
+Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const AggregateRecord& out);
+
 /// Point i as a record that stands for itself.
 AggregateRecord aggregateOfLeaf(const Points& points, size_t i, Key key);
 /// Records in one cell whose normals lie in two cones, apart by more than 35 degrees: `side` says which one each
 /// belongs to. False if there is one cone, or a record without a normal.
 bool splitByNormals(std::span<const AggregateRecord> parts, std::vector<uint8_t>& side);
-/// `parts`: records in one cluster's cell, in order. `leaves`: the points below them, where they are at hand and all
-/// points of the cell are meant. `around`: what the disc is held against.
-AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
-                                const Around& around);
+/// Into `out`, which is new. `parts`: records in one cluster's cell, in order. `leaves`: the points below them, where
+/// they are at hand and all points of the cell are meant. `around`: what the disc is held against.
+void mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
+                     const Around& around, AggregateRecord& out);
 /// The points [begin, end), which are all of a cluster's cell.
-AggregateRecord mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, size_t end,
-                            const Around& around);
+void mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, size_t end, const Around& around,
+                 AggregateRecord& out);
 
 }  // namespace stipple::lod

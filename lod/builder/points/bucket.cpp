@@ -89,64 +89,20 @@ RecordLayout::RecordLayout(bool hasColour, bool hasNormal, bool hasRadius, const
     : hasWord_(hasColour || hasNormal),
       hasNormal_(hasNormal),
       hasRadius_(hasRadius),
-      bytes_(12 + (hasWord_ ? 4u : 0u) + (hasNormal ? 4u : 0u) + (hasRadius ? 4u : 0u)) {
+      restBytes_((hasWord_ ? 4u : 0u) + (hasNormal ? 4u : 0u) + (hasRadius ? 4u : 0u)) {
     for (const AttributeInfo& a : attributes) {
         widths_.push_back(bytesOf(a.type));
-        bytes_ += widths_.back();
+        restBytes_ += widths_.back();
     }
-}
-
-void RecordLayout::writePlace(const Place& place, uint8_t* to) const {
-    const std::array<uint32_t, 3> low{static_cast<uint32_t>(place[0]), static_cast<uint32_t>(place[1]),
-                                      static_cast<uint32_t>(place[2])};
-    std::memcpy(to, low.data(), 12);
-    if (!isWide_) return;
-    const uint64_t high = highOf(place);
-    std::memcpy(to + 12, &high, 8);
-}
-
-void RecordLayout::write(const Points& from, size_t i, uint8_t* to) const {
-    writePlace(from.place(i), to);
-    to += ghostBytes();
-    const auto put = [&](const void* value, size_t bytes) {
-        std::memcpy(to, value, bytes);
-        to += bytes;
-    };
-    if (hasWord_) put(&from.colour[i], 4);
-    if (hasNormal_) put(&from.normal[i], 4);
-    if (hasRadius_) put(&from.radius[i], 4);
-    for (size_t a = 0; a < widths_.size(); ++a) put(from.attributes[a].data() + i * widths_[a], widths_[a]);
-}
-
-Place RecordLayout::placeAt(const uint8_t* from) const {
-    std::array<uint32_t, 3> first{};
-    uint64_t high = 0;
-    std::memcpy(first.data(), from, 12);
-    if (isWide_) std::memcpy(&high, from + 12, 8);
-    return placeOf(first[0], first[1], first[2], high);
 }
 
 void RecordLayout::resize(Points& points, size_t count) const {
     for (auto* column : {&points.x, &points.y, &points.z, &points.normal}) resizeHuge(*column, count);
     resizeHuge(points.colour, count);
     resizeHuge(points.radius, count);
-    points.high.resize(isWide_ ? count : 0);
+    points.high.resize(isWide() ? count : 0);
     points.attributes.resize(widths_.size());
     for (size_t a = 0; a < widths_.size(); ++a) points.attributes[a].resize(count * widths_[a]);
-}
-
-void RecordLayout::read(const uint8_t* from, size_t i, Points& to) const {
-    const auto take = [&](void* value, size_t bytes) {
-        std::memcpy(value, from, bytes);
-        from += bytes;
-    };
-    for (auto* column : {&to.x, &to.y, &to.z}) take(&(*column)[i], 4);
-    if (isWide_) take(&to.high[i], 8);
-    to.colour[i] = kPlainColour | shared::kFlagNoNormal << 24;
-    if (hasWord_) take(&to.colour[i], 4);
-    if (hasNormal_) take(&to.normal[i], 4);
-    if (hasRadius_) take(&to.radius[i], 4);
-    for (size_t a = 0; a < widths_.size(); ++a) take(to.attributes[a].data() + i * widths_[a], widths_[a]);
 }
 
 // ---- where they lie ----
@@ -202,17 +158,24 @@ Result<void> Distributor::flush() {
 }
 
 Result<void> Distributor::add(int worker, const Points& block) {
-    std::vector<uint32_t> seenFrom;
+    std::vector<uint32_t> seenFrom, cells(block.size());
+    std::vector<uint64_t> keys(block.size());
+    forEachKey(frame_, block.coordinates(), [&](size_t i, auto key) {
+        cells[i] = tree_.cellOf(key);
+        keys[i] = static_cast<uint64_t>(key);
+    });
     for (size_t i = 0; i < block.size(); ++i) {
         const Place place = block.place(i);
-        const uint32_t cell = tree_.cellOf(frame_.keyOf(place));
+        const uint32_t cell = cells[i];
+        if (cell == CellTree::kNone)  // where nothing was when it was counted
+            return fail(ErrorKind::input, "changed while it was read", "", "build again when it is complete");
         STIPPLE_TRY(put(worker, plan_.ofCell[cell], kPoints, layout_.bytes(),
-                        [&](uint8_t* to) { layout_.write(block, i, to); }));
+                        [&](uint8_t* to) { layout_.write(block, i, keys[i], to); }));
         if (!wantGhosts_ || plan_.border[cell] == 0) continue;
         ghosts(cell, place, seenFrom);
         for (const uint32_t bucket : seenFrom)
             STIPPLE_TRY(put(worker, bucket, kGhosts, layout_.ghostBytes(),
-                            [&](uint8_t* to) { layout_.writePlace(place, to); }));
+                            [&](uint8_t* to) { layout_.writePlace(place, keys[i], to); }));
     }
     return {};
 }

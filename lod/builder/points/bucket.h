@@ -1,11 +1,14 @@
 // Runs of the Morton order that are built at once, and what of their neighbours they need to see.
 #pragma once
 
+#include <array>
+#include <cstring>
 #include <memory>
 
 #include "engine/base/spill.h"
 #include "lod/builder/octree/cells.h"
 #include "lod/builder/points/points.h"
+#include "shaders/shared/record.h"
 
 namespace stipple::lod {
 
@@ -30,28 +33,87 @@ class RecordLayout {
   public:
     /// Without colours and normals all points have one colour word: it does not travel.
     RecordLayout(bool hasColour, bool hasNormal, bool hasRadius, const std::vector<AttributeInfo>& attributes);
-    /// With the high bits of coordinates: known after the survey.
-    void widen(bool isWide) {
-        bytes_ += (isWide ? 8u : 0u) - (isWide_ ? 8u : 0u);
-        isWide_ = isWide;
+    /// How places are held: known after the survey.
+    void holdPlacesOf(const Frame& frame) {
+        const bool areExact = frame.keyLevels == frame.rootLog2 && frame.keyLevels <= kShortBits;
+        places_ = areExact ? Places::keys : frame.rootLog2 > 32 ? Places::wide : Places::narrow;
     }
-    size_t bytes() const { return bytes_; }
-    bool isWide() const { return isWide_; }
+    size_t bytes() const { return ghostBytes() + restBytes_; }
+    bool isWide() const { return places_ == Places::wide; }
+    bool holdsKeys() const { return places_ == Places::keys; }
     /// A ghost is the beginning of a record: its place.
-    size_t ghostBytes() const { return isWide_ ? 20 : 12; }
-    void write(const Points& from, size_t i, uint8_t* to) const;
+    size_t ghostBytes() const { return places_ == Places::keys ? 8 : places_ == Places::wide ? 20 : 12; }
+    /// `key`: of point i, where keys are held.
+    void write(const Points& from, size_t i, uint64_t key, uint8_t* to) const {
+        writePlace(from.place(i), key, to);
+        to += ghostBytes();
+        const auto put = [&](const void* value, size_t bytes) {
+            std::memcpy(to, value, bytes);
+            to += bytes;
+        };
+        if (hasWord_) put(&from.colour[i], 4);
+        if (hasNormal_) put(&from.normal[i], 4);
+        if (hasRadius_) put(&from.radius[i], 4);
+        for (size_t a = 0; a < widths_.size(); ++a) put(from.attributes[a].data() + i * widths_[a], widths_[a]);
+    }
     /// Of a ghost.
-    void writePlace(const Place& place, uint8_t* to) const;
+    void writePlace(const Place& place, uint64_t key, uint8_t* to) const {
+        if (holdsKeys()) {
+            std::memcpy(to, &key, 8);
+            return;
+        }
+        const std::array<uint32_t, 3> low{static_cast<uint32_t>(place[0]), static_cast<uint32_t>(place[1]),
+                                          static_cast<uint32_t>(place[2])};
+        std::memcpy(to, low.data(), 12);
+        if (!isWide()) return;
+        const uint64_t high = highOf(place);
+        std::memcpy(to + 12, &high, 8);
+    }
     /// Of a record, or of a ghost.
-    Place placeAt(const uint8_t* from) const;
+    Place placeAt(const uint8_t* from) const {
+        if (holdsKeys()) {
+            const uint64_t key = keyAt(from);
+            return {compactShort(key), compactShort(key >> 1), compactShort(key >> 2)};
+        }
+        std::array<uint32_t, 3> low{};
+        uint64_t high = 0;
+        std::memcpy(low.data(), from, 12);
+        if (isWide()) std::memcpy(&high, from + 12, 8);
+        return placeOf(low[0], low[1], low[2], high);
+    }
+    /// Where keys are held.
+    static uint64_t keyAt(const uint8_t* from) {
+        uint64_t key = 0;
+        std::memcpy(&key, from, 8);
+        return key;
+    }
     void resize(Points& points, size_t count) const;
-    /// One record to point i, which is there.
-    void read(const uint8_t* from, size_t i, Points& to) const;
+    /// One record to point i, which is there; but for its place, where keys are held.
+    void read(const uint8_t* from, size_t i, Points& to) const {
+        const auto take = [&](void* value, size_t bytes) {
+            std::memcpy(value, from, bytes);
+            from += bytes;
+        };
+        if (holdsKeys()) {
+            from += 8;
+        } else {
+            for (auto* column : {&to.x, &to.y, &to.z}) take(&(*column)[i], 4);
+            if (isWide()) take(&to.high[i], 8);
+        }
+        to.colour[i] = kPlainColour | shared::kFlagNoNormal << 24;
+        if (hasWord_) take(&to.colour[i], 4);
+        if (hasNormal_) take(&to.normal[i], 4);
+        if (hasRadius_) take(&to.radius[i], 4);
+        for (size_t a = 0; a < widths_.size(); ++a) take(to.attributes[a].data() + i * widths_[a], widths_[a]);
+    }
 
   private:
-    bool hasWord_, hasNormal_, hasRadius_, isWide_ = false;
+    /// As the key alone, where it is the whole place; as 32 bits an axis; with their high bits.
+    enum class Places { keys, narrow, wide };
+    Places places_ = Places::narrow;
+    bool hasWord_, hasNormal_, hasRadius_;
     std::vector<size_t> widths_;
-    size_t bytes_;
+    size_t restBytes_;
 };
 
 /// What a bucket holds: records, and places of points of other buckets that its cells see.

@@ -15,8 +15,6 @@ namespace {
 constexpr uint32_t kMostCells = 64 * 64 * 64;  ///< of clusters in a node
 /// Runs of a node's cells; empty between nodes.
 thread_local std::vector<Around::Run> cellRuns;
-/// Of the leaves around; they stay, for the next node.
-thread_local std::array<std::vector<float>, 7> columns;
 
 struct DiscPlane {
     glm::dvec3 place;
@@ -118,7 +116,7 @@ bool isWithNormals(std::span<const PendingNode> nodes) {
     return std::any_of(nodes.begin(), nodes.end(), [&](const PendingNode& node) {
         return std::any_of(node.records.begin(), node.records.end(),
                            [&](const AggregateRecord& r) { return isNormal(r.flags); }) ||
-               std::any_of(node.leaf.colour.begin(), node.leaf.colour.end(),
+               std::any_of(node.own.points.colour.begin(), node.own.points.colour.end(),
                            [&](uint32_t colour) { return isNormal(colour >> 24); });
     });
 }
@@ -138,8 +136,9 @@ Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* fro
         std::vector<Key> keys;
         for (const PendingNode& child : children) {
             parts.insert(parts.end(), child.records.begin(), child.records.end());
-            for (size_t k = 0; k < child.leaf.size(); ++k)
-                parts.push_back(aggregateOfLeaf(child.leaf, k, child.leafKey[k]));
+            const LeafPoints leaf = child.leaf();
+            for (size_t k = 0; k < leaf.count(); ++k)
+                parts.push_back(aggregateOfLeaf(leaf.points, leaf.first + k, leaf.key[k]));
         }
         for (const AggregateRecord& p : parts) keys.push_back(p.key);
         number(keys);
@@ -150,9 +149,8 @@ Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* fro
                end = std::lower_bound(begin, all.end(), key + (Key{1} << keyBits));
     const size_t first = leaves->first + static_cast<size_t>(begin - all.begin()),
                  count = static_cast<size_t>(end - begin);
-    for (std::vector<float>& column : columns)
-        if (column.size() < count) column.resize(count);
-    const auto at = [&](size_t k) { return columns.at(k).data(); };
+    for (std::vector<float>& column : columns_) column.resize(count);
+    const auto at = [&](size_t k) { return columns_.at(k).data(); };
     x = at(0), y = at(1), z = at(2), nx = at(3), ny = at(4), nz = at(5), radius = at(6);
     const Points& p = leaves->points;
     if (p.high.empty()) {
@@ -178,12 +176,12 @@ void Around::number(std::span<const Key> keys) {
         const Key cell = keys[i] >> grid.clusterShift;
         const auto begin = static_cast<uint32_t>(i);
         while (i < keys.size() && keys[i] >> grid.clusterShift == cell) ++i;
-        used_.push_back(static_cast<uint32_t>(cell - firstCell_));
-        cellRuns[used_.back()] = {begin, static_cast<uint32_t>(i)};
+        used_.cells.push_back(static_cast<uint32_t>(cell - firstCell_));
+        cellRuns[used_.cells.back()] = {begin, static_cast<uint32_t>(i)};
     }
 }
-Around::~Around() {
-    for (const uint32_t cell : used_) cellRuns[cell] = {};
+Around::UsedCells::~UsedCells() {
+    for (const uint32_t cell : cells) cellRuns[cell] = {};
 }
 
 Around::Run Around::at(Key key) const { return cellRuns[static_cast<size_t>((key >> grid.clusterShift) - firstCell_)]; }
@@ -304,11 +302,13 @@ Seen seenPart(const Around& around, const DiscPlane& plane, size_t i) {
 /// stands for and how far those lie from there, of leaves their radii.
 struct Balls {
     std::vector<double> x, y, z, away, weight, reach, radius;
-    size_t count() const { return x.size(); }
-    void resize(size_t count, bool areLeaves) {
-        for (auto* column : {&x, &y, &z, &away}) column->resize(count);
-        for (auto* column : {&weight, &reach}) column->resize(areLeaves ? 0 : count);
-        radius.resize(areLeaves ? count : 0);
+    size_t count = 0;
+    bool areLeaves = false;
+    void begin(size_t balls, bool leaves) {
+        count = balls;
+        areLeaves = leaves;
+        if (count <= x.size()) return;
+        for (auto* column : {&x, &y, &z, &away, &weight, &reach, &radius}) column->resize(count);
     }
     void place(size_t k, const glm::dvec3& at) {
         x[k] = at.x;
@@ -320,6 +320,7 @@ struct Balls {
 using Fours [[gnu::vector_size(32), gnu::may_alias]] = double;
 using FourMasks [[gnu::vector_size(32), gnu::may_alias]] = int64_t;
 struct BallSets {
+    static constexpr size_t kSets = 3;                  ///< the fourth is the third once more
     using Values = double[4];                           // NOLINT(modernize-avoid-c-arrays): a vector
     alignas(32) Values distances;                       ///< of their balls from the record, at most
     alignas(32) Values offX, offY, offZ, reach, least;  ///< of the leaves
@@ -348,11 +349,11 @@ uint32_t coveringCode(const AggregateRecord& record, const Around& around, uint3
 /// Of the balls of each set the leaves' common mean, how far the farthest leaf is from that, and the least radius;
 /// 1e300 of a set without balls.
 STIPPLE_WIDE static void measureSets(Balls& balls, BallSets& sets) {
-    const size_t count = balls.count();
+    const size_t count = balls.count;
     const double *const x = balls.x.data(), *const y = balls.y.data(), *const z = balls.z.data();
     double* const away = balls.away.data();
     for (size_t k = 0; k < count; ++k) away[k] = std::sqrt(x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
-    const bool areLeaves = balls.weight.empty();
+    const bool areLeaves = balls.areLeaves;
     const Fours distances = *reinterpret_cast<const Fours*>(sets.distances);
     Fours sumX{}, sumY{}, sumZ{}, sum{}, least = Fours{} + 1e300;
     for (size_t k = 0; k < count; ++k) {
@@ -386,17 +387,59 @@ STIPPLE_WIDE static void measureSets(Balls& balls, BallSets& sets) {
     for (size_t s = 0; s < 4; ++s) sets.reach[s] = areLeaves ? std::sqrt(reach[s]) : reach[s];
 }
 
+namespace {
+
+/// The same of the few that most records stand for, one set after the other; of a set with the same balls as a larger
+/// one nothing is said.
+void measureFew(Balls& balls, BallSets& sets) {
+    const size_t count = balls.count;
+    for (size_t k = 0; k < count; ++k)
+        balls.away[k] = std::sqrt(balls.x[k] * balls.x[k] + balls.y[k] * balls.y[k] + balls.z[k] * balls.z[k]);
+    size_t inLarger = 0;
+    for (size_t s = BallSets::kSets; s-- > 0;) {
+        sets.least[s] = 1e300;
+        size_t within = 0;
+        glm::dvec3 sum(0);
+        double weights = 0, least = 1e300, reach = 0;
+        for (size_t k = 0; k < count; ++k) {
+            if (!(balls.away[k] <= sets.distances[s])) continue;
+            ++within;
+            const double weight = balls.areLeaves ? 1 : balls.weight[k];
+            sum += weight * glm::dvec3(balls.x[k], balls.y[k], balls.z[k]);
+            weights += weight;
+            least = std::min(least, balls.areLeaves ? balls.radius[k] : 0.0);
+        }
+        if (within == 0 || within == inLarger) continue;
+        inLarger = within;
+        const glm::dvec3 off = sum / weights;
+        for (size_t k = 0; k < count; ++k) {
+            if (!(balls.away[k] <= sets.distances[s])) continue;
+            const glm::dvec3 d = glm::dvec3(balls.x[k], balls.y[k], balls.z[k]) - off;
+            const double squared = d.x * d.x + d.y * d.y + d.z * d.z;
+            reach = std::max(reach, balls.areLeaves ? squared : std::sqrt(squared) + balls.reach[k]);
+        }
+        sets.offX[s] = off.x;
+        sets.offY[s] = off.y;
+        sets.offZ[s] = off.z;
+        sets.least[s] = least;
+        sets.reach[s] = balls.areLeaves ? std::sqrt(reach) : reach;
+    }
+}
+
+}  // namespace
+
 double coveringErrorOfBall(const AggregateRecord& record, std::span<const AggregateRecord> parts,
                            const Leaves* leaves) {
+    constexpr size_t kFew = 12;  // more are measured four sets at once
     thread_local Balls balls;
     if (leaves != nullptr) {
-        balls.resize(record.count, true);
+        balls.begin(record.count, true);
         for (size_t k = 0; k < record.count; ++k) {
             balls.place(k, leaves->points.at(record.first + k) - record.place);
             balls.radius[k] = static_cast<double>(leaves->points.radius[record.first + k]);
         }
     } else {
-        balls.resize(parts.size(), false);
+        balls.begin(parts.size(), false);
         for (size_t k = 0; k < parts.size(); ++k) {
             const AggregateRecord& p = parts[k];
             balls.place(k, p.mean - record.place);
@@ -407,12 +450,13 @@ double coveringErrorOfBall(const AggregateRecord& record, std::span<const Aggreg
     const auto radius = static_cast<double>(record.radius);
     const double all = radius * (1 + 1e-6);
     BallSets sets{{0.25 * all, 0.5 * all, all, all}, {}, {}, {}, {}, {}};
-    measureSets(balls, sets);
+    (balls.count <= kFew ? measureFew : measureSets)(balls, sets);
     // A place of the record's ball has one of the leaves on its side of their common mean.
     double error = 1e300;
-    for (size_t s = 0; s < 3; ++s) {
-        const double off = glm::length(glm::dvec3(sets.offX[s], sets.offY[s], sets.offZ[s]));
-        if (sets.least[s] < 1e300) error = std::min(error, std::hypot(radius + off, sets.reach[s]) - sets.least[s]);
+    for (size_t s = 0; s < BallSets::kSets; ++s) {
+        if (!(sets.least[s] < 1e300)) continue;
+        const double far = radius + glm::length(glm::dvec3(sets.offX[s], sets.offY[s], sets.offZ[s]));
+        error = std::min(error, std::sqrt(far * far + sets.reach[s] * sets.reach[s]) - sets.least[s]);
     }
     return std::max(error, radius);
 }

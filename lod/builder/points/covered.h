@@ -24,7 +24,6 @@ class Around {
     /// `key`: of the node's corner; `leaves` may be null.
     Around(const RecordGrid& grid, Key key, uint32_t keyBits, const Leaves* leaves,
            std::span<const PendingNode> children);
-    ~Around();
     Around(const Around&) = delete;
     Around& operator=(const Around&) = delete;
 
@@ -47,10 +46,16 @@ class Around {
     glm::dvec3 corner{0};
 
   private:
+    /// Cells of the thread's table that hold something; empty again when this ends, however it does.
+    struct UsedCells {
+        std::vector<uint32_t> cells;
+        ~UsedCells();
+    };
     void number(std::span<const Key> keys);
     Key firstCell_ = 0;
     double cellsPerUnit_ = 0;
-    std::vector<uint32_t> used_;
+    std::array<std::vector<float>, 7> columns_;
+    UsedCells used_;
 };
 
 /// Code of an error not below that of `code` which all places of the record's disc keep to the nearest leaf of its

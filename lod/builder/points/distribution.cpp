@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <filesystem>
 
 #include "engine/base/hash.h"
@@ -67,7 +68,7 @@ Result<void> Distribution::run(const std::vector<Journal::Entry>& entries, Build
 }
 
 Result<void> Distribution::count(BuildReport& report, StageClock& clock) {
-    STIPPLE_TRY(input_.survey(report, executor_, progress_));
+    STIPPLE_TRY(input_.survey(report, executor_, progress_, wanted_.keepsPlaces));
     clock.ends("survey");
     setFrame();
     tree_.emplace(frame_, input_.points);
@@ -82,13 +83,14 @@ Result<void> Distribution::count(BuildReport& report, StageClock& clock) {
                 tree_->count(block.coordinates());
                 return workspace_.checkStopped();
             },
-            &far);
+            PointInput::Wanted::places, &far);
         STIPPLE_TRY(agree(ranks, verdict(counted)));
         if (!far.empty()) input_.concludeOutliers(std::exchange(far, {}), report);
         rounding_ = *counted;
         if (ranks != nullptr) tree_->addUp([&](std::vector<uint32_t>& counts) { ranks->addUp(counts); });
     } while (tree_->split());
     tree_->finish();
+    input_.dropPlaces();
     rounding_ = largestOf(workspace_, rounding_);
     clock.ends("count");
     ByteWriter to;
@@ -101,7 +103,7 @@ Result<void> Distribution::count(BuildReport& report, StageClock& clock) {
 
 void Distribution::setFrame() {
     frame_ = makeFrame(input_.origin, input_.unit, input_.span, settings_.leafRecords, input_.resolution);
-    layout_.widen(frame_.rootLog2 > 32);
+    layout_.holdPlacesOf(frame_);
     frame_.attributes = input_.attributes();
 }
 
@@ -154,15 +156,16 @@ Result<void> Distribution::send() {
     Ranks* const ranks = workspace_.ranks();
     Distributor distributor(frame_, *tree_, plan_, layout_, buckets_, wanted_.workers, wanted_.bufferBytes,
                             wanted_.wantGhosts);
+    constexpr uint32_t kSaidEvery = 16;  // blocks: all buckets are asked
+    std::atomic<uint32_t> blocks{0};
     for (PointInput::Range range{nextPart_, nextPart_, 0}; range.end < input_.parts();) {
         range = input_.nextRange(range, often);
-        const Result<double> sent = input_.read(executor_, wanted_.workers, progress_, "distribute", range,
-                                                [&](int worker, const Points& block) -> Result<void> {
-                                                    STIPPLE_TRY(distributor.add(worker, block));
-                                                    if (workspace_.isOnDisk())
-                                                        progress_.setTemporaryBytes(temporaryBytes());
-                                                    return workspace_.checkStopped();
-                                                });
+        const auto take = [&](int worker, const Points& block) -> Result<void> {
+            STIPPLE_TRY(distributor.add(worker, block));
+            if (workspace_.isOnDisk() && blocks++ % kSaidEvery == 0) progress_.setTemporaryBytes(temporaryBytes());
+            return workspace_.checkStopped();
+        };
+        const Result<double> sent = input_.read(executor_, wanted_.workers, progress_, "distribute", range, take);
         STIPPLE_TRY(agree(ranks, named(verdict(sent))));
         STIPPLE_TRY(agree(ranks, named(distributor.flush())));
         if (range.end < input_.parts()) STIPPLE_TRY(note(Journal::What::sent, range.end));

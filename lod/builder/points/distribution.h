@@ -15,8 +15,10 @@ class Distribution {
         int workers = 1;
         uint64_t bufferBytes = 0, bucketPoints = 0;
         bool wantGhosts = false;  ///< neighbours are looked at
+        bool keepsPlaces =
+            false;  ///< from the survey to the count: 12 bytes a point, which are planned for the buckets
     };
-    /// `layout`: widened where the input is wide.
+    /// `layout`: is told how places are held, once the input was surveyed.
     Distribution(PointInput& input, const BuildSettings& settings, RecordLayout& layout, const Plan& plan,
                  Workspace& workspace, Executor& executor, Progress& progress)
         : input_(input),

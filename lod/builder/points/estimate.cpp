@@ -438,7 +438,8 @@ void estimate(const Frame& frame, const CellTree& tree, uint32_t firstCell, uint
     p.normal.resize(p.size());
     p.radius.resize(p.size());
     const auto all = [&]<typename K>(const SeenKeys<K>& keys) {
-        executor.parallelFor(cells, 1, [&](size_t begin, size_t end) {
+        const size_t least = executor.threads() > 1 ? 1 : cells;  // an estimator's memory grows with what it sees
+        executor.parallelFor(cells, least, [&](size_t begin, size_t end) {
             Estimator<K> estimator(frame, tree, settings, keys, ghosts, own);
             for (size_t k = begin; k < end; ++k) estimator.cell(firstCell + static_cast<uint32_t>(k));
         });

@@ -1,6 +1,7 @@
 #include "lod/builder/points/fan.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/base/wide.h"
 
@@ -44,11 +45,6 @@ struct Open {
         }
     }
 };
-[[gnu::always_inline]] inline float leastIn(const Floats& values) {
-    float least = values[0];
-    for (size_t k = 1; k < kLanes; ++k) least = std::min(least, values[k]);
-    return least;
-}
 
 }  // namespace
 
@@ -94,7 +90,7 @@ STIPPLE_WIDE static float holdBetweenRays(float* held, const Circles& circles, f
         floatsAt(held, k * kLanes).v = holds[k];
         least = holds[k] < least ? holds[k] : least;
     }
-    return leastIn(least);
+    return leastOf(least);
 }
 
 /// Of what is open between two rays, all that one of the circles to be tried there holds. True: that is all.
@@ -108,7 +104,7 @@ STIPPLE_WIDE static bool closeBetweenRays(float* held, const Circles& circles, c
             Floats most;
             open.farthest(circles, i, most);
             const Floats radius = floatsAt(circles.radius.data(), i).v;
-            if (!isAny((most < radius * radius) & (kNumbers < static_cast<int32_t>(last - i)))) continue;
+            if (!isAny((most < radius * radius) & (kLaneNumbers < static_cast<int32_t>(last - i)))) continue;
             held[k] = rim;
             break;
         }
@@ -129,10 +125,10 @@ STIPPLE_WIDE static float mostLacking(const float* held, const Circles& circles,
             open.farthest(circles, i, lacks);
             takeRoots(lacks);
             lacks -= floatsAt(circles.radius.data(), i).v;
-            lacks = kNumbers < static_cast<int32_t>(circles.count - i) ? lacks : Floats{} + kFar;
+            lacks = kLaneNumbers < static_cast<int32_t>(circles.count - i) ? lacks : Floats{} + kFar;
             least = lacks < least ? lacks : least;
         }
-        most = std::max(most, leastIn(least));
+        most = std::max(most, leastOf(least));
     }
     return most;
 }

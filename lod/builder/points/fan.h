@@ -1,5 +1,5 @@
 // Whether circles cover a disc, seen along rays from its centre: between two of them the disc is held as far out as one
-// circle after the other holds both rays. That errs towards what is not covered only.
+// circle after the other holds both rays. That errs towards what is not covered only. Lengths are lattice units.
 #pragma once
 
 #include <array>
@@ -15,6 +15,7 @@ struct Circles {
     using Column = std::array<float, kMost + kLanes>;  ///< whole vectors may be read
     alignas(64) Column u, v, radius;
     size_t count = 0;
+    /// Not if there is no room left, nor if the radius is not above 0 (or is not a number): fewer circles cover less.
     void add(float atU, float atV, float r) {
         if (!(r > 0) || count == kMost) return;
         u[count] = atU;
@@ -32,12 +33,14 @@ class Fan {
     static constexpr size_t kRays = 32;
     explicit Fan(float radius) : radius_(radius), rim_(radius / kNarrowest) {}
 
-    /// One circle after the other, until the disc is held. True: it is.
+    /// One circle after the other, until the disc is held. True: it is; the others are not looked at then, so
+    /// only a new fan knows how far out all of them hold.
     bool add(const Circles& circles);
     /// The same with all of them. Gives the radius of a disc that is held.
     float addAll(const Circles& circles);
     /// Of what is still open between two rays, all that a single one of those circles holds. `circlesAt(u, v)`: which
-    /// of `circles` to try for that place of the rim (it may add some). True: the disc is held.
+    /// of `circles` to try for that place, just inside the rim between both rays. All places are asked for before any
+    /// circle is tried: it may append to these `circles`. True: the disc is held.
     template <typename CirclesAt>
     bool close(const Circles& circles, const CirclesAt& circlesAt) {
         std::array<Circles::Range, kRays> tried;

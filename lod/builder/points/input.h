@@ -5,8 +5,10 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 
+#include "engine/base/huge_region.h"
 #include "engine/base/numbers.h"
 #include "lod/builder/build.h"
 #include "lod/builder/lattice.h"
@@ -16,7 +18,7 @@
 
 namespace stipple::lod {
 
-inline constexpr size_t kBlockPoints = 65536;  ///< that a reader gives at once
+inline constexpr size_t kBlockPoints = 8192;  ///< that a reader gives at once: what they take stays in the second cache
 
 class PointInput {
   public:
@@ -31,8 +33,11 @@ class PointInput {
     /// Of names, sizes and times of the files: does a build that was interrupted go on with the same input?
     uint64_t identity() const;
 
-    /// Reads everything once: bounds, which parts are corrupt, what the colours mean. Fills `report`.
-    Result<void> survey(BuildReport& report, Executor& executor, Progress& progress);
+    /// Reads everything once: bounds, which parts are corrupt, what the colours mean. Fills `report`. `keepsPlaces`: of
+    /// points on a lattice the places stay in memory (12 bytes a point), so that who asks for places alone need not
+    /// read and decompress them again.
+    Result<void> survey(BuildReport& report, Executor& executor, Progress& progress, bool keepsPlaces = false);
+    void dropPlaces();
     /// One for each worker, to be given to one whole read() and then to concludeOutliers(); none where nothing is far
     /// or outliers are known.
     std::vector<FarCubes> farCubes(int workers) const;
@@ -70,8 +75,10 @@ class PointInput {
     size_t parts() const { return parts_.size(); }
     /// The parts after `range` that hold `points` points or a little more.
     Range nextRange(const Range& range, uint64_t points) const;
+    enum class Wanted { all, places };
     Result<double> read(Executor& executor, int workers, Progress& progress, const std::string& stage,
-                        const Range& range, const Sink& sink, std::vector<FarCubes>* far = nullptr) const;
+                        const Range& range, const Sink& sink, Wanted wanted = Wanted::all,
+                        std::vector<FarCubes>* far = nullptr) const;
 
   private:
     struct Part {
@@ -90,6 +97,7 @@ class PointInput {
         std::vector<glm::dvec3> places;  ///< likewise, each once
         Bounds near;                     ///< of what is not far, where outliers are left out; common coordinates
         uint64_t far = 0;
+        bool isKept = false;  ///< its places are in kept_
     };
 
     Result<void> openAll(const std::vector<std::string>& inputs, const BuildSettings& settings, BuildReport& report);
@@ -105,6 +113,8 @@ class PointInput {
     Result<void> checkParts() const;
     void tally(BuildReport& report);
     Result<void> surveyPart(Part& part, PointBlock& block) const;
+    void keep(const Part& part, const PointBlock& block, uint64_t at) const;
+    Result<PointReader> openPlaces(const Part& part) const;
     void surveyBounds(const PointBlock& block, size_t count, Part& part) const;
     void surveyColours(const PointBlock& block, size_t count, Part& part) const;
     void findSpan();
@@ -125,8 +135,8 @@ class PointInput {
     void findColours(BuildReport& report);
     void placeSample();
     bool isWide() const { return span >> 32 != 0; }
-    Result<void> readPart(const Part& part, PointBlock& block, Points& points, double& rounding, FarCubes* far,
-                          const std::function<Result<void>(const Points&)>& sink) const;
+    Result<void> readPart(const Part& part, Wanted wanted, PointBlock& block, Points& points, double& rounding,
+                          FarCubes* far, const std::function<Result<void>(const Points&)>& sink) const;
     size_t leaveOut(const Part& part, PointBlock& block, size_t count, uint64_t& far) const;
     void place(const Part& part, const PointBlock& block, size_t count, Points& out, double& rounding) const;
     void placeWide(const Part& part, const PointBlock& block, size_t count, Points& out, double& rounding) const;
@@ -139,6 +149,7 @@ class PointInput {
     BuildSettings settings_;
     std::vector<PointSource> sources_;
     std::vector<Part> parts_;
+    std::unique_ptr<HugeRegion> kept_;  ///< of each part the places, glm::ivec3
     std::vector<AttributeInfo> attributes_;
     std::vector<std::vector<uint8_t>> materialOf_;  ///< of each source: its materials' numbers in `materials`
     CommonLattice lattice_;                         ///< where all sources are lattices

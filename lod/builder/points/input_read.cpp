@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 
 #include "engine/base/numbers.h"
 #include "engine/base/queue.h"
@@ -20,7 +21,7 @@ PointInput::Range PointInput::nextRange(const Range& range, uint64_t wanted) con
 }
 
 Result<double> PointInput::read(Executor& executor, int workers, Progress& progress, const std::string& stage,
-                                const Range& range, const Sink& sink, std::vector<FarCubes>* far) const {
+                                const Range& range, const Sink& sink, Wanted wanted, std::vector<FarCubes>* far) const {
     std::atomic<bool> stop{false};
     std::atomic<uint64_t> done{range.before};
     std::atomic<size_t> next{range.begin};
@@ -36,11 +37,12 @@ Result<double> PointInput::read(Executor& executor, int workers, Progress& progr
                 const Part& part = parts_[i];
                 if (part.error || !isOwnPart(i)) continue;
                 FarCubes* const cubes = far != nullptr && !far->empty() ? &(*far)[worker] : nullptr;
-                const auto result = readPart(part, block, out, rounding, cubes, [&](const Points& b) -> Result<void> {
-                    STIPPLE_TRY(sink(static_cast<int>(worker), b));
-                    progress.update(stage, done += b.size(), points);
-                    return {};
-                });
+                const auto result =
+                    readPart(part, wanted, block, out, rounding, cubes, [&](const Points& b) -> Result<void> {
+                        STIPPLE_TRY(sink(static_cast<int>(worker), b));
+                        progress.update(stage, done += b.size(), points);
+                        return {};
+                    });
                 if (!result) {
                     stop = true;
                     errors.push(result.error());
@@ -52,13 +54,37 @@ Result<double> PointInput::read(Executor& executor, int workers, Progress& progr
     return *std::max_element(roundings.begin(), roundings.end()) * (allLattice_ ? unit / step_ : unit);
 }
 
-Result<void> PointInput::readPart(const Part& part, PointBlock& block, Points& out, double& rounding, FarCubes* far,
-                                  const std::function<Result<void>(const Points&)>& sink) const {
+/// The places of a block that begins with the part's point `at`.
+void PointInput::keep(const Part& part, const PointBlock& block, uint64_t at) const {
+    const std::span<uint8_t> to = kept_->part(static_cast<size_t>(&part - parts_.data()));
+    std::memcpy(to.data() + at * sizeof(glm::ivec3), block.lattice.data(), block.lattice.size() * sizeof(glm::ivec3));
+}
+
+/// What the survey kept of it, or else from the file, with all that it has.
+Result<PointReader> PointInput::openPlaces(const Part& part) const {
+    if (!part.isKept) return sources_[part.source].openPart(part.index);
+    const uint8_t* const from = kept_->part(static_cast<size_t>(&part - parts_.data())).data();
+    return PointReader([&part, from, at = uint64_t{0}](PointBlock& block, size_t limit) mutable -> Result<size_t> {
+        const size_t count = std::min<uint64_t>(limit, part.count - at);
+        block.lattice.resize(count);
+        std::memcpy(block.lattice.data(), from + at * sizeof(glm::ivec3), count * sizeof(glm::ivec3));
+        at += count;
+        return count;
+    });
+}
+
+void PointInput::dropPlaces() {
+    for (Part& part : parts_) part.isKept = false;
+    kept_ = nullptr;
+}
+
+Result<void> PointInput::readPart(const Part& part, Wanted wanted, PointBlock& block, Points& out, double& rounding,
+                                  FarCubes* far, const std::function<Result<void>(const Points&)>& sink) const {
     const PointSource& from = sources_[part.source];
     const auto changed = [&] {
         return fail(ErrorKind::input, "changed while it was read", from.info.path, "build again when it is complete");
     };
-    STIPPLE_ASSIGN(const PointReader read, from.openPart(part.index));
+    STIPPLE_ASSIGN(const PointReader read, wanted == Wanted::places ? openPlaces(part) : from.openPart(part.index));
     const bool isWatched = far != nullptr && outliers_.reaches(boundsOf(part));
     uint64_t usable = 0, farPoints = 0;
     for (uint64_t at = 0;;) {
@@ -85,7 +111,7 @@ Result<void> PointInput::readPart(const Part& part, PointBlock& block, Points& o
         } else {
             farPoints = part.far;
         }
-        fill(part, block, out);
+        if (wanted == Wanted::all || !part.isKept || !allLattice_) fill(part, block, out);
         place(part, block, count, out, rounding);
         usable += out.size();
         if (!isWithin(out)) return changed();

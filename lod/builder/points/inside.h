@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 
 #include "lod/builder/points/lattice_box.h"
 
@@ -12,20 +14,21 @@ namespace stipple::lod {
 struct NarrowPlaces {
     const uint32_t *x, *y, *z;
 };
-/// Box of them, both ends inside.
+/// Box of them, both ends inside; on no axis lo > hi.
 struct NarrowBox {
     std::array<uint32_t, 3> lo, hi;
 };
-/// Writes the numbers of those places of [begin, end), at most kMostInside, that are inside the box; returns how many.
 inline constexpr size_t kMostInside = 256;
+/// Writes the numbers of those places of [begin, end) that are inside the box; returns how many. end - begin is at most
+/// kMostInside, and `inside` has room for all of them.
 size_t findInside(const NarrowPlaces& places, size_t begin, size_t end, const NarrowBox& box, uint32_t* inside);
 
-/// Calls f(i) for those, in order.
+/// Calls f(i) for those of any [begin, end), in order; for none where lo > hi on an axis.
 template <typename F>
 void forInside(const NarrowPlaces& places, size_t begin, size_t end, const LatticeBox& box, const F& f) {
     NarrowBox narrow{};
     for (size_t a = 0; a < 3; ++a) {
-        if (box.hi[a] < 0 || box.lo[a] > int64_t{UINT32_MAX}) return;
+        if (box.lo[a] > box.hi[a] || box.hi[a] < 0 || box.lo[a] > int64_t{UINT32_MAX}) return;
         narrow.lo[a] = static_cast<uint32_t>(std::max<int64_t>(box.lo[a], 0));
         narrow.hi[a] = static_cast<uint32_t>(std::min(box.hi[a], int64_t{UINT32_MAX}));
     }

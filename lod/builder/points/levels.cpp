@@ -46,17 +46,19 @@ glm::dvec3 recordBase(const Frame& frame, const Node& node) {
 
 // ---- normal cones ----
 
-void leafCone(const Points& points, Node& node) {
+void leafCone(const LeafPoints& leaf, Node& node) {
+    const std::span<const uint32_t> normals = std::span(leaf.points.normal).subspan(leaf.first, leaf.count());
     glm::dvec3 sum(0);
-    for (size_t i = 0; i < points.size(); ++i) {
-        if ((points.colour[i] >> 24 & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0) return;
-        sum += glm::dvec3(shared::octDecode(points.normal[i]));
+    for (size_t k = 0; k < leaf.count(); ++k) {
+        const uint32_t flags = leaf.points.colour[leaf.first + k] >> 24;
+        if ((flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0) return;
+        sum += glm::dvec3(shared::octDecode(normals[k]));
     }
-    if (!(glm::length(sum) > 1e-3 * static_cast<double>(points.size()))) return;
+    if (!(glm::length(sum) > 1e-3 * static_cast<double>(leaf.count()))) return;
     node.normalCone = octEncode(glm::vec3(glm::normalize(sum)));
     const glm::vec3 axis = shared::octDecode(node.normalCone);
     node.normalConeCosine = 1;
-    for (const uint32_t n : points.normal)
+    for (const uint32_t n : normals)
         node.normalConeCosine =
             std::min(node.normalConeCosine, glm::dot(axis, glm::vec3(shared::octDecode(n))) - 1e-6f);
     node.normalConeCosine = std::max(node.normalConeCosine, -1.0f);  // all directions
@@ -116,45 +118,56 @@ void appendCounts(const std::array<uint32_t, 256>& histogram, NodeBatch& batch, 
     }
 }
 
+using Streams = std::vector<std::vector<uint8_t>>;  ///< of each attribute its values
+
+void putLeafRecords(const Frame& frame, const PendingNode& pending, Order& order, Chunk& chunk, Streams& streams) {
+    const Node& node = pending.node;
+    const LeafPoints leaf = pending.leaf();
+    const Points& p = leaf.points;
+    const uint64_t size = uint64_t{1} << (frame.rootLog2 - node.level);
+    const bool hasLowBits = !chunk.lowBits.empty();
+    RadiusCodes radii(frame.cellSize(node.level));
+    for (size_t k = 0; k < leaf.count(); ++k) {
+        const size_t at = order.next[pending.leafParentCode[k]]++, i = leaf.first + k;
+        const Place place = p.place(i);
+        const auto steps = [&](size_t a) { return coordinate(place.at(a), size, node.stepShift); };
+        chunk.records[at] = {steps(0) | steps(1) << 16, steps(2) | radii.upOf(p.radius[i]) << 16, p.normal[i],
+                             p.colour[i]};
+        for (size_t a = 0; a < streams.size(); ++a) {
+            const size_t width = bytesOf(frame.attributes[a].type);
+            std::memcpy(streams[a].data() + at * width, p.attributes[a].data() + i * width, width);
+        }
+        if (!hasLowBits) continue;
+        const uint64_t mask = (uint64_t{1} << node.stepShift) - 1;
+        for (size_t a = 0; a < 3; ++a) chunk.lowBits[at * 3 + a] = static_cast<uint32_t>(place.at(a) & mask);
+    }
+}
+
+void putInnerRecords(const Frame& frame, const PendingNode& pending, Order& order, Chunk& chunk, Streams& streams) {
+    for (size_t k = 0; k < pending.records.size(); ++k) {
+        const AggregateRecord& record = pending.records[k];
+        const size_t at = order.next[record.parentCode]++;
+        chunk.records[at] = record.packed;
+        for (size_t a = 0; a < streams.size(); ++a)
+            storeValue(frame.attributes[a], pending.values[k * streams.size() + a], record.count,
+                       streams[a].data() + at * bytesOf(frame.attributes[a].type));
+    }
+}
+
 /// Writes a node whose records know their parents' codes.
 void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
     Node& node = pending.node;
     const bool isLeaf = node.isLeaf();
-    const size_t count = node.records, kinds = frame.attributes.size();
+    const size_t count = node.records;
     Order order(
         count, [&](size_t k) { return isLeaf ? pending.leafParentCode[k] : pending.records[k].parentCode; },
         [&](size_t k) { return isLeaf ? uint8_t{0} : pending.records[k].code; });
     thread_local Chunk chunk;
     chunk.records.resize(count);
-    const bool hasLowBits = isLeaf && node.stepShift > 0;
-    chunk.lowBits.resize(hasLowBits ? count * 3 : 0);
-    std::vector<std::vector<uint8_t>> streams;
+    chunk.lowBits.resize(isLeaf && node.stepShift > 0 ? count * 3 : 0);
+    Streams streams;
     for (const AttributeInfo& a : frame.attributes) streams.emplace_back(count * bytesOf(a.type));
-    const uint64_t size = uint64_t{1} << (frame.rootLog2 - node.level);
-    RadiusCodes radii(frame.cellSize(node.level));
-    for (size_t k = 0; k < count; ++k) {
-        const size_t at = order.next[isLeaf ? pending.leafParentCode[k] : pending.records[k].parentCode]++;
-        for (size_t a = 0; a < kinds; ++a) {
-            const size_t width = bytesOf(frame.attributes[a].type);
-            uint8_t* const to = streams[a].data() + at * width;
-            if (isLeaf)
-                std::memcpy(to, pending.leaf.attributes[a].data() + k * width, width);
-            else
-                storeValue(frame.attributes[a], pending.values[k * kinds + a], pending.records[k].count, to);
-        }
-        if (!isLeaf) {
-            chunk.records[at] = pending.records[k].packed;
-            continue;
-        }
-        const Points& p = pending.leaf;
-        const uint32_t radius = radii.upOf(p.radius[k]);
-        const Place place = p.place(k);
-        const auto steps = [&](size_t a) { return coordinate(place.at(a), size, node.stepShift); };
-        chunk.records[at] = {steps(0) | steps(1) << 16, steps(2) | radius << 16, p.normal[k], p.colour[k]};
-        if (!hasLowBits) continue;
-        const uint64_t mask = (uint64_t{1} << node.stepShift) - 1;
-        for (size_t a = 0; a < 3; ++a) chunk.lowBits[at * 3 + a] = static_cast<uint32_t>(place.at(a) & mask);
-    }
+    (isLeaf ? putLeafRecords : putInnerRecords)(frame, pending, order, chunk, streams);
     const std::vector<uint8_t> bytes = encodeChunk(chunk), attributes = encodeAttributes(frame.attributes, streams);
     node.spacingCode = spacingCodeUp(recordSpacing(chunk.records));
     node.chunkOffset = batch.bytes.size();
@@ -192,55 +205,66 @@ PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_
     RadiusCodes codes(edge);
     for (size_t i = begin; i < end; ++i)
         from.points.radius[i] = static_cast<float>(radiusOf(codes.upOf(from.points.radius[i]), edge));
-    out.firstPoint = static_cast<uint32_t>(begin);
-    const auto copy = [&](auto& to, const auto& values) {
-        to.assign(values.begin() + static_cast<ptrdiff_t>(begin), values.begin() + static_cast<ptrdiff_t>(end));
-    };
-    copy(out.leaf.x, from.points.x);
-    copy(out.leaf.y, from.points.y);
-    copy(out.leaf.z, from.points.z);
-    if (!from.points.high.empty()) copy(out.leaf.high, from.points.high);
-    copy(out.leaf.colour, from.points.colour);
-    copy(out.leaf.normal, from.points.normal);
-    copy(out.leaf.radius, from.points.radius);
-    copy(out.leafKey, from.key);
-    for (size_t a = 0; a < frame.attributes.size(); ++a) {
-        const size_t width = bytesOf(frame.attributes[a].type);
-        const uint8_t* const values = from.points.attributes[a].data();
-        out.leaf.attributes.emplace_back(values + begin * width, values + end * width);
-    }
+    out.among = &from;
+    out.firstPoint = begin;
     out.leafParentCode.assign(end - begin, static_cast<uint8_t>(ErrorScale::kNoParent));
     const uint32_t shift = frame.shiftOf(level);
     out.key = from.key[begin] >> shift << shift;
     out.node = emptyNode(frame, level, out.key);
     Box box;
-    for (size_t i = 0; i < out.leaf.size(); ++i) box.add(out.leaf.at(i));
+    for (size_t i = begin; i < end; ++i) box.add(from.points.at(i));
     Node& node = out.node;
     node.centre = box.centre();
     double radius = 0;
-    for (size_t i = 0; i < out.leaf.size(); ++i)
-        radius = std::max(radius, glm::length(out.leaf.at(i) - node.centre) + static_cast<double>(out.leaf.radius[i]));
+    for (size_t i = begin; i < end; ++i)
+        radius =
+            std::max(radius, glm::length(from.points.at(i) - node.centre) + static_cast<double>(from.points.radius[i]));
     // Positions may be held in steps coarser than the lattice.
     node.radius = radius * (1 + 1e-6) + (node.stepShift > 0 ? std::exp2(node.stepShift) : 0.0);
     node.records = static_cast<uint32_t>(end - begin);
-    leafCone(out.leaf, node);
+    leafCone(out.leaf(), node);
     return out;
+}
+
+/// A leaf that leaves its subtree takes its points with it.
+void takePoints(PendingNode& node) {
+    if (node.among == nullptr) return;
+    const LeafPoints leaf = node.leaf();
+    const auto part = [&](const auto& values, size_t width = 1) {
+        const auto first = values.begin() + static_cast<ptrdiff_t>(leaf.first * width);
+        return std::decay_t<decltype(values)>(first, first + static_cast<ptrdiff_t>(leaf.count() * width));
+    };
+    const Points& from = leaf.points;
+    Points& to = node.own.points;
+    to.x = part(from.x);
+    to.y = part(from.y);
+    to.z = part(from.z);
+    if (!from.high.empty()) to.high = part(from.high);
+    to.colour = part(from.colour);
+    to.normal = part(from.normal);
+    to.radius = part(from.radius);
+    for (const std::vector<uint8_t>& values : from.attributes)
+        to.attributes.push_back(part(values, values.size() / from.size()));
+    node.own.key.assign(leaf.key.begin(), leaf.key.end());
+    node.among = nullptr;
+    node.firstPoint = 0;
 }
 
 /// One record for the records of a cell; two, where those lie in two cones of normals and one disc would be a poor
 /// proxy for both (an edge between two walls), so that flat parts get large discs and edges keep small errors.
 class ConeMerger {
   public:
-    /// `one`: the record of all `count` parts, which partsOf() gives where they are asked for.
+    /// The last record of `out` is that of all `count` parts, which partsOf() gives where they are asked for.
     template <typename PartsOf, typename CodeOf>
-    void add(const Frame& frame, const AggregateRecord& one, size_t count, const PartsOf& partsOf,
-             std::span<const AggregateValue> values, const Around& around, const CodeOf& codeOf, PendingNode& out) {
+    void finish(const Frame& frame, size_t count, const PartsOf& partsOf, std::span<const AggregateValue> values,
+                const Around& around, const CodeOf& codeOf, PendingNode& out) {
+        const AggregateRecord& one = out.records.back();
         if (!mayBeSplit(around.grid, count, one) || !isSplit(partsOf(), one, around)) {
-            out.records.push_back(one);
             for (size_t k = 0; k < count; ++k) codeOf(k) = one.code;
             mergeAttributes(frame, count, values, out);
             return;
         }
+        out.records.pop_back();
         for (size_t k = 0; k < count; ++k) codeOf(k) = of_.at(side_[k]).code;
         for (uint8_t g = 0; g < 2; ++g) {
             out.records.push_back(of_.at(g));
@@ -267,7 +291,8 @@ class ConeMerger {
         for (auto& m : members_) m.clear();
         for (size_t k = 0; k < parts.size(); ++k) members_.at(side_[k]).push_back(parts[k]);
         for (size_t g = 0; g < 2; ++g) {
-            of_.at(g) = mergeAggregates(around.grid, members_.at(g), nullptr, around);
+            of_.at(g) = {};
+            mergeAggregates(around.grid, members_.at(g), nullptr, around, of_.at(g));
             if (of_.at(g).code + kWorthwhile > one.code) return false;
         }
         return true;
@@ -300,18 +325,25 @@ RecordGrid gridOf(const Frame& frame, const Node& node) {
     return grid;
 }
 
-/// How many clusters' cells hold records of these nodes.
-size_t cellsOf(std::span<const PendingNode> nodes, uint32_t clusterShift) {
-    size_t cells = 0;
-    for (const PendingNode& node : nodes) {
-        const auto add = [&](const auto& items, const auto& keyOf) {
-            for (size_t k = 0; k < items.size(); ++k)
-                cells += k == 0 || keyOf(items[k]) >> clusterShift != keyOf(items[k - 1]) >> clusterShift ? 1 : 0;
-        };
-        add(node.records, [](const AggregateRecord& r) { return r.key; });
-        add(node.leafKey, [](Key key) { return key; });
-    }
-    return cells;
+const AggregateRecord kNew;  // (a copy is made faster)
+
+/// Where the records of each cluster's cell end.
+void findRuns(const PendingNode& node, uint32_t clusterShift, std::vector<uint32_t>& ends) {
+    const Key above = ~Key{0} << clusterShift;
+    const auto find = [&](size_t count, const auto& keyAt) {
+        ends.resize(count);
+        size_t found = 0;
+        for (size_t k = 1; k < count; ++k) {
+            ends[found] = static_cast<uint32_t>(k);
+            found += ((keyAt(k) ^ keyAt(k - 1)) & above) != 0 ? 1 : 0;
+        }
+        ends.resize(found);
+        ends.push_back(static_cast<uint32_t>(count));
+    };
+    if (node.node.isLeaf())
+        find(node.node.records, [keys = node.leaf().key](size_t k) { return keys[k]; });
+    else
+        find(node.node.records, [&](size_t k) { return node.records[k].key; });
 }
 
 /// What those above want to know of a node's records, whose leaves are not at hand there.
@@ -337,32 +369,35 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
     const size_t kinds = frame.attributes.size();
     thread_local std::vector<AggregateRecord> points;
     thread_local std::vector<AggregateValue> leafValues;
+    thread_local std::array<std::vector<uint32_t>, 8> ends;
     thread_local ConeMerger cones;
-    out.records.reserve(cellsOf(children, grid.clusterShift) * 9 / 8);  // (some are split)
-    for (PendingNode& child : children) {
+    size_t runs = 0;
+    for (size_t c = 0; c < children.size(); ++c) {
+        findRuns(children[c], grid.clusterShift, ends.at(c));
+        runs += ends.at(c).size();
+    }
+    out.records.reserve(runs * 9 / 8);  // (some are split)
+    for (size_t c = 0; c < children.size(); ++c) {
+        PendingNode& child = children[c];
         const bool isLeaf = child.node.isLeaf();
+        const LeafPoints leaf = child.leaf();
         out.node.childMask = static_cast<uint8_t>(
             out.node.childMask | 1u << static_cast<uint32_t>(child.key >> frame.shiftOf(level + 1) & 7u));
-        const size_t count = child.node.records;
-        const auto keyAt = [&](size_t k) { return isLeaf ? child.leafKey[k] : child.records[k].key; };
-        for (size_t begin = 0, end = 0; begin < count; begin = end) {
-            const Key cell = keyAt(begin) >> grid.clusterShift;
-            for (end = begin + 1; end < count && keyAt(end) >> grid.clusterShift == cell;) ++end;
+        size_t begin = 0;
+        for (const size_t end : ends.at(c)) {
             const auto partsOf = [&]() -> std::span<const AggregateRecord> {
                 if (!isLeaf) return std::span(child.records).subspan(begin, end - begin);
                 points.clear();
-                for (size_t k = begin; k < end; ++k) {
-                    points.push_back(aggregateOfLeaf(child.leaf, k, child.leafKey[k]));
-                    points.back().first += child.firstPoint;
-                }
+                for (size_t k = begin; k < end; ++k)
+                    points.push_back(aggregateOfLeaf(leaf.points, leaf.first + k, leaf.key[k]));
                 return points;
             };
             std::span<const AggregateValue> values;
             if (isLeaf) {
                 leafValues.clear();
-                for (size_t k = begin; k < end; ++k)
+                for (size_t k = leaf.first + begin; k < leaf.first + end; ++k)
                     for (size_t a = 0; a < kinds; ++a)
-                        leafValues.push_back(leafValue(frame.attributes[a], child.leaf.attributes[a].data() +
+                        leafValues.push_back(leafValue(frame.attributes[a], leaf.points.attributes[a].data() +
                                                                                 k * bytesOf(frame.attributes[a].type)));
                 values = leafValues;
             } else {
@@ -371,11 +406,13 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
             const auto codeOf = [&](size_t k) -> uint8_t& {
                 return isLeaf ? child.leafParentCode[begin + k] : child.records[begin + k].parentCode;
             };
-            const AggregateRecord one =
-                isLeaf && leaves != nullptr
-                    ? mergeLeaves(grid, *leaves, child.firstPoint + begin, child.firstPoint + end, around)
-                    : mergeAggregates(grid, partsOf(), leaves, around);
-            cones.add(frame, one, end - begin, partsOf, values, around, codeOf, out);
+            AggregateRecord& one = out.records.emplace_back(kNew);
+            if (isLeaf && leaves != nullptr)
+                mergeLeaves(grid, *leaves, leaf.first + begin, leaf.first + end, around, one);
+            else
+                mergeAggregates(grid, partsOf(), leaves, around, one);
+            cones.finish(frame, end - begin, partsOf, values, around, codeOf, out);
+            begin = end;
         }
     }
     if (leaves == nullptr) measureCores(out.records, around);
@@ -468,6 +505,7 @@ PendingNode makeSubtree(const Frame& frame, SortedPoints& from, size_t begin, si
             leaves.hasNormals = true;
         }
     PendingNode root = subtreeOf(frame, from, begin, end, level, batch, leaves);
+    takePoints(root);
     const Around around(gridOf(frame, root.node), root.key, frame.shiftOf(level), &leaves, {});
     measureCores(root.records, around);
     return root;

@@ -47,16 +47,29 @@ struct AggregateValue {
     uint64_t votes = 0;
 };
 
+/// Points [first, first + count) of many.
+struct LeafPoints {
+    const Points& points;
+    std::span<const Key> key;  ///< of its own points alone
+    size_t first;
+    size_t count() const { return key.size(); }
+};
+
 /// A node whose records are known and whose chunk is not yet written, as its order needs the parent's codes.
 struct PendingNode {
     Node node;
     Key key = 0;                           ///< of its cell: Morton code of `keyLevels` levels
     std::vector<AggregateRecord> records;  ///< of an inner node
     std::vector<AggregateValue> values;    ///< records x attributes
-    Points leaf;                           ///< of a leaf
-    uint32_t firstPoint = 0;               ///< of a leaf, where its points are at hand
-    std::vector<Key> leafKey;
+    // Of a leaf: its points, which lie among those of its subtree, and are its own once it leaves that.
+    const SortedPoints* among = nullptr;
+    size_t firstPoint = 0;
+    SortedPoints own;
     std::vector<uint8_t> leafParentCode;
+    LeafPoints leaf() const {
+        const SortedPoints& of = among != nullptr ? *among : own;
+        return {of.points, std::span(of.key).subspan(firstPoint, leafParentCode.size()), firstPoint};
+    }
 };
 
 /// Points [first, first + normal.size()) with their normals decoded (zero: none), to measure against.

@@ -1,8 +1,8 @@
 #include "lod/builder/points/select.h"
 
-#include <algorithm>
 #include <bit>
 
+#include "engine/base/lanes.h"
 #include "engine/base/wide.h"
 
 namespace stipple::lod {
@@ -29,9 +29,7 @@ STIPPLE_WIDE float smallestAtRank(const int32_t* values, size_t count, size_t ra
             const Lanes within = (v[i].v < limit) & v[i].v;
             most = within > most ? within : most;
         }
-        int32_t result = 0;
-        for (size_t k = 0; k < kLanes; ++k) result = std::max(result, most[k]);
-        return result;
+        return mostOf(most);
     };
     if (guess > 0) {
         const float there = countUpTo(guess);
@@ -60,14 +58,11 @@ STIPPLE_WIDE float smallestAtRank(const int32_t* values, size_t count, size_t ra
             equal -= value == result;
             most = within > most ? within : most;
         }
-        int32_t times = 0, next = 0;
-        for (size_t k = 0; k < kLanes; ++k) {
-            times += equal[k];
-            next = std::max(next, most[k]);
-        }
+        int32_t times = 0;
+        for (size_t k = 0; k < kLanes; ++k) times += equal[k];
         if (static_cast<float>(times) > above - wanted) break;
         above -= static_cast<float>(times);
-        result = next;
+        result = mostOf(most);
     }
     return std::bit_cast<float>(result);
 }

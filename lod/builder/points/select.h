@@ -4,11 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "engine/base/lanes.h"
-
 namespace stipple::lod {
 
-/// Values come in vectors of kLanes; those behind the last are this.
+/// Values come in vectors (of kLanes, engine/base/lanes.h); those behind the last are this.
 inline constexpr int32_t kNothing = INT32_MAX;
 
 /// The value at `rank` (0: the least) of `count` > `rank` non-negative floats, given as their bits: those have the same

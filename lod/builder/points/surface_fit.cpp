@@ -22,7 +22,7 @@ constexpr double kRound = 12.0;   ///< second variance over the third, of a line
 constexpr double kRoundings = 4;  ///< second variance over that of rounding
 
 constexpr size_t kNearest = 3;  ///< vectors of a neighbourhood, after which hardly anything comes nearer
-constexpr float kSteep = 0.5f;
+constexpr float kSteep = 0.5f;  ///< squared cosine of a neighbour's angle to the plane, at least
 constexpr float kSteepest = 1.5867f;
 
 struct Sums {
@@ -40,9 +40,6 @@ STIPPLE_WIDE static void addUp(const Neighbours& all, const float (&from)[3], co
     const auto* const y = reinterpret_cast<const Anywhere<Floats>*>(all.y);
     const auto* const z = reinterpret_cast<const Anywhere<Floats>*>(all.z);
     const size_t vectors = (all.count + kLanes - 1) / kLanes;
-    const auto keepOnly = [](Floats& v, const Lanes& mask) {
-        v = reinterpret_cast<Floats>(reinterpret_cast<Lanes>(v) & mask);
-    };
     const auto total = [](const Floats& v) {
         float sum = 0;
         for (size_t k = 0; k < kLanes; ++k) sum += v[k];
@@ -86,9 +83,7 @@ struct Extents {
     Lanes there{}, opposite{};
     [[gnu::always_inline]] float least() const {
         const Lanes lesser = there < opposite ? there : opposite;
-        int32_t least = lesser[0];
-        for (size_t k = 1; k < kLanes; ++k) least = std::min(least, lesser[k]);
-        return std::bit_cast<float>(least);
+        return std::bit_cast<float>(leastOf(lesser));
     }
 };
 
@@ -118,7 +113,8 @@ struct PlaneAt {
         Floats root = flat * squared;
         takeRoots(root);
         const Lanes counts = isMeant & (flat > 0.0f) & (flat >= kSteep * squared);
-        const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Lanes>(1.0f / root) & counts);
+        Floats inverse = 1.0f / root;
+        keepOnly(inverse, counts);
         floatsAt(inverted.u.data(), kLanes * to).v = u * inverse;
         floatsAt(inverted.v.data(), kLanes * to).v = v * inverse;
     }
@@ -153,7 +149,7 @@ STIPPLE_WIDE static void supports(const Neighbours& all, const float (&from)[3],
     const size_t first = vectors > 1 ? vectors / 2 - 1 : 0, last = std::min(first + kNearest, vectors);
     float farthest = 1 / (floor * floor);  // squared distance of what can still count
     const auto keepThose = [&](size_t i, Lanes& isMeant) {
-        isMeant &= kNumbers < static_cast<int32_t>(all.count - kLanes * i);
+        isMeant &= kLaneNumbers < static_cast<int32_t>(all.count - kLanes * i);
     };
     Floats dx, dy, dz, squared;
     Inverted inverted;
@@ -234,9 +230,7 @@ STIPPLE_WIDE static int32_t leastCorner(const int32_t* around, float floor, floa
         const Lanes here = isCorner ? h : Lanes{} + kNothing;
         found = here < found ? here : found;
     }
-    int32_t result = kNothing;
-    for (size_t k = 0; k < kLanes; ++k) result = std::min(result, found[k]);
-    return result;
+    return leastOf(found);
 }
 
 float farthestCorner(const std::array<float, kDirections>& inverse, float most, bool isUneven) {

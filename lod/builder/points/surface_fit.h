@@ -8,11 +8,12 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "lod/builder/points/select.h"
+#include "engine/base/lanes.h"
 
 namespace stipple::lod {
 
-/// Neighbourhood of neighbours, parallel; each with room for whole vectors of kLanes (behind the last: any numbers).
+/// Neighbourhood of neighbours, parallel; each with room for whole vectors of kLanes (behind the last: any finite
+/// numbers).
 struct Neighbours {
     const float *x, *y, *z;
     size_t count;
@@ -55,7 +56,10 @@ Spread spreadOf(const Neighbours& all, const float (&from)[3], const int32_t* sq
 
 inline constexpr size_t kDirections = 16;
 /// For kDirections in a plane through `from`, evenly around it from `axis` on to `across` (unit vectors): the inverse
-/// of twice the distance to where the plane belongs to a neighbour instead, 0 if it never does. That is the support
+/// of twice the distance to where the plane belongs to a neighbour instead, 0 if it never does. Neighbours are turned
+/// into the plane for that, each as far from `from` as it is: of one at d, whose foot in the plane is f, the value is
+/// dot(f, direction) / (|f| |d|). (As they stand, the plane would be theirs from up to 1.41 times as far on, where the
+/// surface bends, and discs that much wider.) Those more than 45 degrees over it do not count. That is the support
 /// function of the neighbours after inversion in the unit sphere, its least values the corners of the Voronoi cell.
 /// Distances above `most` are of no interest: what comes for them is too small, or 0.
 std::array<float, kDirections> inverseExtents(const Neighbours& all, const float (&from)[3], const glm::vec3& axis,

@@ -8,7 +8,7 @@
 #include "lod/builder/points/estimate.h"
 #include "lod/builder/points/inside.h"
 #include "lod/builder/points/lattice_box.h"
-#include "lod/builder/points/seen.h"
+#include "lod/builder/points/sorted_keys.h"
 
 namespace stipple::lod {
 
@@ -26,13 +26,7 @@ class Surroundings {
     /// `keys`: of `ghosts` and `own`.
     Surroundings(const Frame& frame, const CellTree& tree, const SeenKeys<K>& keys, const Places& ghosts,
                  SortedPoints& own)
-        : frame_(frame),
-          tree_(tree),
-          ghosts_(ghosts),
-          own_(own),
-          allKeys_(keys),
-          keys_(keys.own.all()),
-          ghostKeys_(keys.ghosts.all()) {}
+        : frame_(frame), tree_(tree), ghosts_(ghosts), own_(own), allKeys_(keys), keys_(keys.own.all()) {}
 
     void setCell(const Cell& c) {
         cell_ = c;
@@ -55,7 +49,8 @@ class Surroundings {
     }
     using Range = KeyRange;
     Range allOwn() const { return {0, keys_.size()}; }
-    Range allGhosts() const { return {0, ghostKeys_.size()}; }
+    const std::vector<K>& ghostKeys() const { return allKeys_.ghosts.all(); }
+    Range allGhosts() const { return {0, ghostKeys().size()}; }
 
     /// Calls f(begin, end) for each child of a cell of `level` that holds some of [begin, end).
     template <typename F>
@@ -76,8 +71,8 @@ class Surroundings {
         const uint32_t shift = frame_.shiftOf(level);
         const auto [begin, end] = keyRange(keys_, key, shift, own);
         descend(keys_, own_.points, begin, end, level, box, f);
-        const auto [first, last] = keyRange(ghostKeys_, key, shift, ghosts);
-        descend(ghostKeys_, ghosts_, first, last, level, box, f);
+        const auto [first, last] = keyRange(ghostKeys(), key, shift, ghosts);
+        descend(ghostKeys(), ghosts_, first, last, level, box, f);
     }
     /// Calls f(x, y, z) for point i.
     template <typename Of, typename F>
@@ -89,7 +84,7 @@ class Surroundings {
     template <typename Of, typename F>
     void descend(const std::vector<K>& keys, const Of& points, size_t begin, size_t end, uint32_t level,
                  const LatticeBox& box, const F& f) const {
-        constexpr size_t kFew = 256;
+        constexpr size_t kFew = kMostInside;  // what one findInside looks at
         if (begin == end) return;
         if (end - begin <= kFew || level >= frame_.keyLevels) {
             const auto see = [&](size_t i, int64_t x, int64_t y, int64_t z) {
@@ -182,7 +177,7 @@ class Surroundings {
     const Places& ghosts_;
     SortedPoints& own_;
     const SeenKeys<K>& allKeys_;
-    const std::vector<K>&keys_, &ghostKeys_;
+    const std::vector<K>& keys_;  ///< own
     Cell cell_;
     uint32_t cellShift_ = 0;
 

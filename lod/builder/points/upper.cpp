@@ -48,11 +48,12 @@ void visit(Archive& archive, Pending& p) {
     with(p.key);
     with(p.records);
     with(p.values);
-    for (auto* column : {&p.leaf.x, &p.leaf.y, &p.leaf.z, &p.leaf.colour, &p.leaf.normal}) with(*column);
-    with(p.leaf.high);
-    with(p.leaf.radius);
-    with(p.leaf.attributes);
-    with(p.leafKey);
+    auto& points = p.own.points;
+    for (auto* column : {&points.x, &points.y, &points.z, &points.colour, &points.normal}) with(*column);
+    with(points.high);
+    with(points.radius);
+    with(points.attributes);
+    with(p.own.key);
     with(p.leafParentCode);
 }
 

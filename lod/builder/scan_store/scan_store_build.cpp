@@ -105,7 +105,7 @@ class ScanBuild : public CellContent {
                                                   at.at(a).push_back(placeAt(block, i).at(a));
                                           return take({at[0], at[1], at[2]}, input_.points);
                                       },
-                                      &far_));
+                                      PointInput::Wanted::places, &far_));
         if (!far_.empty()) input_.concludeOutliers(std::exchange(far_, {}), found_);
         heights_ = {heights.below(0.02), heights.below(0.98)};
         ByteWriter to;
