@@ -1,9 +1,10 @@
 // Places that the survey of a build keeps: who asks for places alone needs the file no more.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "lod/builder/points/input.h"
@@ -43,46 +44,51 @@ Read readAll(const PointInput& input, PointInput::Wanted wanted) {
     return out;
 }
 
+/// Files that were surveyed.
+struct Surveyed {
+    BuildReport report;
+    std::optional<PointInput> input;
+    Surveyed(const std::vector<std::string>& paths, bool keepsPlaces, bool skipBad = false) {
+        const auto executor = makeTbbExecutor(2);
+        Progress progress(false);
+        BuildSettings settings;
+        settings.skipBad = skipBad;
+        Result<PointInput> opened = PointInput::open(paths, settings, report);
+        EXPECT_TRUE(opened);
+        input.emplace(std::move(*opened));
+        EXPECT_TRUE(input->survey(report, *executor, progress, keepsPlaces));
+    }
+    Read all() const { return readAll(*input, PointInput::Wanted::all); }
+    Read places() const { return readAll(*input, PointInput::Wanted::places); }
+};
+
 TEST(KeptPlaces, AreThoseOfTheFileWhichIsNotReadAgain) {
-    const auto executor = makeTbbExecutor(2);
     for (const bool isCompressed : {false, true}) {
         const test::TempFolder folder;
         const std::string path = folder / "a.laz";
         writeScan(path, isCompressed);
-        BuildSettings settings;
-        BuildReport report;
-        Progress progress(false);
-        Result<PointInput> input = PointInput::open({path}, settings, report);
-        ASSERT_TRUE(input) << input.error().line();
-        ASSERT_TRUE(input->survey(report, *executor, progress, true));
-        const Read before = readAll(*input, PointInput::Wanted::all);
+        Surveyed scan({path}, true);
+        const Read before = scan.all();
         ASSERT_EQ(before.problem, "");
         ASSERT_EQ(before.places.size(), kPoints);
         std::filesystem::resize_file(path, 2000);
-        EXPECT_NE(readAll(*input, PointInput::Wanted::all).problem, "") << "what is no place is in the file alone";
-        const Read kept = readAll(*input, PointInput::Wanted::places);
+        EXPECT_NE(scan.all().problem, "") << "what is no place is in the file alone";
+        const Read kept = scan.places();
         EXPECT_EQ(kept.problem, "");
         EXPECT_EQ(kept.places, before.places);
-        input->dropPlaces();
-        EXPECT_NE(readAll(*input, PointInput::Wanted::places).problem, "");
+        scan.input->dropPlaces();
+        EXPECT_NE(scan.places().problem, "");
     }
 }
 
-TEST(KeptPlaces, OfAPartThatIsDamagedAreNone) {
-    const auto executor = makeTbbExecutor(2);
+TEST(KeptPlaces, OfWhatIsDamagedAreAsManyAsOthersGet) {
     const test::TempFolder folder;
     writeScan(folder / "a.laz", true);
     writeScan(folder / "b.laz", true);
     std::filesystem::resize_file(folder / "b.laz", std::filesystem::file_size(folder / "b.laz") * 7 / 10);
-    BuildSettings settings;
-    settings.skipBad = true;
-    BuildReport report;
-    Progress progress(false);
-    Result<PointInput> input = PointInput::open({folder / "a.laz", folder / "b.laz"}, settings, report);
-    ASSERT_TRUE(input) << input.error().line();
-    ASSERT_TRUE(input->survey(report, *executor, progress, true));
-    EXPECT_GT(report.dropped["corrupt"], 0u);
-    const Read all = readAll(*input, PointInput::Wanted::all), kept = readAll(*input, PointInput::Wanted::places);
+    Surveyed scans({folder / "a.laz", folder / "b.laz"}, true, true);
+    EXPECT_GT(scans.report.dropped["corrupt"], 0u);
+    const Read all = scans.all(), kept = scans.places();
     EXPECT_EQ(all.problem, "");
     EXPECT_EQ(kept.problem, "");
     EXPECT_GE(all.places.size(), kPoints);
@@ -91,19 +97,15 @@ TEST(KeptPlaces, OfAPartThatIsDamagedAreNone) {
 }
 
 TEST(KeptPlaces, AreReadAgainWhereNobodyKeepsThem) {
-    const auto executor = makeTbbExecutor(2);
     const test::TempFolder folder;
     const std::string path = folder / "a.laz";
     writeScan(path, true);
-    BuildSettings settings;
-    BuildReport report;
-    Progress progress(false);
-    Result<PointInput> input = PointInput::open({path}, settings, report);
-    ASSERT_TRUE(input) << input.error().line();
-    ASSERT_TRUE(input->survey(report, *executor, progress));
-    EXPECT_EQ(readAll(*input, PointInput::Wanted::places).places, readAll(*input, PointInput::Wanted::all).places);
+    const Surveyed scan({path}, false);
+    const Read before = scan.places();
+    EXPECT_EQ(before.places.size(), kPoints);
+    EXPECT_EQ(before.places, scan.all().places);
     std::filesystem::resize_file(path, 2000);
-    EXPECT_NE(readAll(*input, PointInput::Wanted::places).problem, "");
+    EXPECT_NE(scan.places().problem, "");
 }
 
 }  // namespace
