@@ -331,7 +331,7 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
         // An edge's value: two products of an edge, which has both corners there, and a pixel's way from one of them.
         constexpr double kCorner = 131072.0, kSide = 16384.0, kSteps = 256.0;  // 2 kGuardPixels, a picture, kSubpixel
         static_assert(2.0 * (2.0 * kCorner * kSteps) * ((kCorner + kSide) * kSteps) < 0x1p53, "doubles hold it");
-        const auto guarded = [](float p) { return min(max(float(-kCorner), p), float(kCorner)); };
+        const auto guarded = [](float p) { return min(max(-2.0f * kGuardPixels, p), 2.0f * kGuardPixels); };
         x[i] = snapPixel(guarded(polygon[i].x * scale + f.centre.x));
         y[i] = snapPixel(guarded(polygon[i].y * scale + f.centre.y));
         inverse[i] = imageLinear(lens, polygon[i].z);
