@@ -51,6 +51,26 @@ struct TexelRow {
     bool isRounded;  ///< to pack and unpack it would change nothing
 };
 
+/// Some texels of a tile's row, a bit each.
+struct RowBits {
+    uint64_t of[kTile / 64] = {};
+    [[gnu::always_inline]] bool isAny() const { return (of[0] | of[1]) != 0; }
+    [[gnu::always_inline]] uint32_t count() const {
+        return static_cast<uint32_t>(__builtin_popcountll(of[0]) + __builtin_popcountll(of[1]));
+    }
+    [[gnu::always_inline]] void add(uint32_t i) { of[i / 64] |= uint64_t{1} << i % 64; }
+    /// Those of a group (kTexelGroup).
+    [[gnu::always_inline]] uint32_t group(uint32_t g) const {
+        return static_cast<uint32_t>(of[g / 4] >> g % 4 * kTexelGroup) & ((1u << kTexelGroup) - 1u);
+    }
+};
+/// Texels of a row side by side, without the gaps between them.
+struct ClosedUpRow {
+    TexelRow texels;
+    uint32_t count;
+    RowBits of;  ///< where they are in the row
+};
+
 /// A coarse row that is pushed from, with its texels' discs (CoarseDisc).
 struct CoarseRow {
     static constexpr uint32_t kSize = TexelRow::kSize;
@@ -380,11 +400,12 @@ struct Kernels {
     /// Those of the block's first `count` records that claim a pixel.
     void (*findClaims)(const ProjectedBlock& block, uint32_t count, Claims& to);
     /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are
-    /// empty.
+    /// empty. `closedUp`: where some pixels show nothing and all others show points, their texels once more (else it
+    /// is of none).
     /// `planes`: from the row's first pixel on; null without triangles, 0 where none is seen.
     bool (*resolveRow)(const shared::FrameConstants& f, const Tables& tables, const ResolveInput& in,
-                       uint64_t* visibility, uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius,
-                       const SurfacePlanes& planes);
+                       uint64_t* visibility, uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, ClosedUpRow& closedUp,
+                       float& largestRadius, const SurfacePlanes& planes);
     /// The same and all passes after it, where points show their own colours and nobody asks for more: their pixels of
     /// the picture. Does nothing if the row shows something else (with
     /// `tellsSmooth` points of smooth nodes, too), or nothing. `nothing`: a pixel without points.
@@ -395,6 +416,9 @@ struct Kernels {
     /// `held`: those groups; others become empty, and nothing of them is read. `to`: entry of the first in the row.
     /// `hasNormals`: else those of rows without tubes and materials are any.
     void (*unpackRow)(const Planes& from, uint32_t to, uint32_t n, uint32_t held, bool hasNormals, TexelRow& row);
+    /// Packed texels that are closed up, each in its place of a row; of groups without any nothing is written, of
+    /// others 0 between them. Reads up to a group more than there are, writes whole groups.
+    void (*spreadPacked)(const Planes& from, const RowBits& of, bool hasNormals, const Planes& to);
     void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float focal,
                     TexelRow& out);
     /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy. (x, y): centre of the row's

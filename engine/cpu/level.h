@@ -1,4 +1,6 @@
-// One level of the pyramid in memory: the planes of packed texels, and which parts of its rows hold any.
+// One level of the pyramid in memory: packed texels, and which parts of its rows hold any. The texels of a tile lie
+// side by side, row after row, so that whoever goes through it goes through memory: of a row first all depths, then all
+// sizes and so on, which are its planes.
 #pragma once
 
 #include <algorithm>
@@ -11,23 +13,31 @@
 
 namespace stipple::cpu {
 
+constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
+constexpr uint32_t kTileRows = 2 * kBandRows;
+
 class Level {
   public:
     uint32_t width = 0, height = 0;
 
-    void resize(uint32_t w, uint32_t h, bool hasMaterials) {
+    /// `mayCloseUp`: rows of tiles may be closed up (closeUp).
+    void resize(uint32_t w, uint32_t h, bool hasMaterials, bool mayCloseUp) {
         width = w;
         height = h;
         hasMaterials_ = hasMaterials;
-        words_.assign((hasMaterials ? size_t{6} : size_t{5}) * w * h, 0);
+        tiles_ = (w + kTile - 1) / kTile;
+        rowsOfTile_ = std::min(h, kTileRows);
+        const size_t bands = (h + rowsOfTile_ - 1) / rowsOfTile_;
+        words_.assign(bands * tiles_ * rowsOfTile_ * wordsOfRow() + kTexelGroup, 0);  // (groups are read as wholes)
+        closedUp_.assign(mayCloseUp ? size_t{h} * tiles_ : 0, {});
         perRow_ = (w + kSegment - 1) / kSegment;
         filled_.assign(size_t{perRow_} * h, 0);
     }
-    Planes planes() {
-        const size_t n = size_t{width} * height;
-        uint32_t* p = words_.data();
-        return {reinterpret_cast<float*>(p),        p + n, p + 2 * n, p + 3 * n, p + 4 * n,
-                hasMaterials_ ? p + 5 * n : nullptr};
+    /// Of the texels of a row from `x` on, up to the end of the tile.
+    Planes planes(uint32_t y, uint32_t x) { return planesOf(firstOfRow(y, x) + x % kTile, kTile); }
+    /// Of a row of a tile that is closed up to so many texels, which lie side by side without gaps between planes.
+    Planes planesClosedUp(uint32_t y, uint32_t x, uint32_t texels) {
+        return planesOf(firstOfRow(y, x), (texels + kTexelGroup - 1) / kTexelGroup * kTexelGroup);
     }
     /// May any of these texels of a row be there?
     bool mayHold(uint32_t y, uint32_t x, uint32_t n) const {
@@ -56,15 +66,28 @@ class Level {
     }
     /// It is these from now on, of which the planes hold all; depths of those that held some before become 0.
     void hold(uint32_t y, uint32_t x, uint32_t n, uint32_t groups) {
+        if (!closedUp_.empty()) closedUp_[tileRow(y, x)] = {};
         uint8_t* const at = filled_.data() + size_t{y} * perRow_ + x / kSegment;
         const uint32_t gone = held(y, x, n) & ~groups;
-        float* const depth = planes().depth + size_t{y} * width + x;
+        float* const depth = planes(y, x).depth;
         for (uint32_t g = 0; gone >> g != 0; ++g)
             if ((gone >> g & 1u) != 0)
                 std::fill_n(depth + g * kTexelGroup, std::min(kTexelGroup, n - g * kTexelGroup), 0.0f);
         at[0] = static_cast<uint8_t>(groups & kSegmentMask);
         if (n > kSegment) at[1] = static_cast<uint8_t>(groups >> kSegmentGroups);
     }
+    /// The row of a tile is these from now on, which the planes hold side by side, from its first place on.
+    void closeUp(uint32_t y, uint32_t x, const RowBits& texels) {
+        uint32_t groups = 0;
+        for (uint32_t g = 0; g < kTile / kTexelGroup; ++g) groups |= (texels.group(g) != 0 ? 1u : 0u) << g;
+        uint8_t* const at = filled_.data() + size_t{y} * perRow_ + x / kSegment;
+        at[0] = static_cast<uint8_t>(groups & kSegmentMask);
+        if (groups >> kSegmentGroups != 0 || x + kSegment < width)
+            at[1] = static_cast<uint8_t>(groups >> kSegmentGroups);
+        closedUp_[tileRow(y, x)] = texels;
+    }
+    /// Those of such a row; of none if it is not closed up.
+    RowBits closedUp(uint32_t y, uint32_t x) const { return closedUp_.empty() ? RowBits{} : closedUp_[tileRow(y, x)]; }
     /// None is there.
     void empty(uint32_t y, uint32_t x, uint32_t n) {
         if (mayHold(y, x, n)) hold(y, x, n, 0);
@@ -75,8 +98,19 @@ class Level {
     /// of both.
     static constexpr uint32_t kSegment = kTile / 2, kSegmentGroups = kSegment / kTexelGroup,
                               kSegmentMask = (1u << kSegmentGroups) - 1;
+    size_t tileRow(uint32_t y, uint32_t x) const { return size_t{y} * tiles_ + x / kTile; }
+    size_t wordsOfRow() const { return (hasMaterials_ ? size_t{6} : size_t{5}) * kTile; }
+    uint32_t* firstOfRow(uint32_t y, uint32_t x) {
+        const size_t tile = size_t{y / rowsOfTile_} * tiles_ + x / kTile;
+        return words_.data() + (tile * rowsOfTile_ + y % rowsOfTile_) * wordsOfRow();
+    }
+    Planes planesOf(uint32_t* p, size_t n) const {
+        return {reinterpret_cast<float*>(p),        p + n, p + 2 * n, p + 3 * n, p + 4 * n,
+                hasMaterials_ ? p + 5 * n : nullptr};
+    }
     HugeBuffer<uint32_t> words_;
-    uint32_t perRow_ = 0;
+    std::vector<RowBits> closedUp_;  ///< of the rows of tiles
+    uint32_t perRow_ = 0, tiles_ = 0, rowsOfTile_ = 1;
     bool hasMaterials_ = false;
     std::vector<uint8_t> filled_;  ///< of each segment its groups: depths of those that hold none are 0 in memory
 };

@@ -161,6 +161,100 @@ constexpr ClosedUp kClosedUp;
 }
 #endif
 
+/// Which of a group's keys, or of its first `lanes`, are those of something: a bit each.
+#if defined(__AVX512VL__)
+[[gnu::always_inline]] inline uint32_t shownBits(const uint64_t* keys, uint32_t lanes) {
+    const __m512i none = _mm512_set1_epi64(static_cast<long long>(kNoKey));
+    const uint32_t all = kWholeGroup >> (kTexelGroup - lanes);
+    const auto low = static_cast<__mmask8>(all), high = static_cast<__mmask8>(all >> 8);
+    return uint32_t{_mm512_mask_cmpneq_epi64_mask(low, _mm512_maskz_loadu_epi64(low, keys), none)} |
+           uint32_t{_mm512_mask_cmpneq_epi64_mask(high, _mm512_maskz_loadu_epi64(high, keys + 8), none)} << 8;
+}
+#elif defined(__AVX2__)
+[[gnu::always_inline]] inline uint32_t shownBits(const uint64_t* keys, uint32_t lanes) {
+    const __m256i none = _mm256_set1_epi64x(static_cast<long long>(kNoKey));
+    uint32_t bits = 0, i = 0;
+    for (; i + 4 <= lanes; i += 4) {
+        const __m256i four = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(keys + i));
+        const int same = _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(four, none)));
+        bits |= (static_cast<uint32_t>(same) ^ 15u) << i;
+    }
+    for (; i < lanes; ++i) bits |= (keys[i] != kNoKey ? 1u : 0u) << i;
+    return bits;
+}
+#else
+[[gnu::always_inline]] inline uint32_t shownBits(const uint64_t* keys, uint32_t lanes) {
+    uint32_t bits = 0;
+    for (uint32_t i = 0; i < lanes; ++i) bits |= (keys[i] != kNoKey ? 1u : 0u) << i;
+    return bits;
+}
+#endif
+/// Writes `first` + k for each k of a group that is in the set, and may write all of the group.
+[[gnu::always_inline]] inline void storeNumbers(uint32_t set, uint32_t first, uint32_t* to) {
+#if defined(__AVX512VL__)
+    const __m512i all = _mm512_maskz_add_epi32(0xffff, _mm512_set1_epi32(static_cast<int>(first)),
+                                               _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15));
+    _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(static_cast<__mmask16>(set), all));
+#else
+    for (; set != 0u; set &= set - 1u) *to++ = first + uint32_t(__builtin_ctz(set));
+#endif
+}
+
+/// Values that are closed up, each in its place of a group: those where the set has a bit, 0 in the others. All of the
+/// group are written; up to a group is read.
+#if defined(__AVX512VL__)
+struct SpreadGroup {
+    __mmask16 there;
+};
+[[gnu::always_inline]] inline SpreadGroup spreadGroup(uint32_t set) { return {static_cast<__mmask16>(set)}; }
+template <typename T>
+[[gnu::always_inline]] inline void spreadOut(SpreadGroup s, const T* from, T* to) {
+    _mm512_storeu_si512(to, _mm512_maskz_expand_epi32(s.there, _mm512_loadu_si512(from)));
+}
+#elif defined(__AVX2__)
+/// Of each set of eight lanes: for those that are in it how many are before them, for others a negative number; a byte
+/// each.
+struct Spread {
+    uint64_t of[256] = {};
+    constexpr Spread() {
+        for (uint32_t set = 0; set < 256; ++set)
+            for (uint32_t lane = 0, count = 0; lane < 8; ++lane)
+                of[set] |= uint64_t{(set >> lane & 1u) != 0u ? count++ : 0x80u} << 8u * lane;
+    }
+};
+constexpr Spread kSpreadPlaces;
+struct SpreadGroup {
+    __m256i low, high;
+    size_t ofLow;
+};
+[[gnu::always_inline]] inline SpreadGroup spreadGroup(uint32_t set) {
+    const auto of = [](uint32_t eight) {
+        return _mm256_cvtepi8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kSpreadPlaces.of[eight])));
+    };
+    return {of(set & 0xffu), of(set >> 8), size_t(__builtin_popcount(set & 0xffu))};
+}
+template <typename T>
+[[gnu::always_inline]] inline void spreadOut(const SpreadGroup& s, const T* from, T* to) {
+    const auto eight = [](const T* of, __m256i places, T* out) {
+        const __m256i read = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(of)),
+                      all = _mm256_permutevar8x32_epi32(read, places);
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm256_andnot_si256(_mm256_srai_epi32(places, 31), all));
+    };
+    eight(from, s.low, to);
+    eight(from + s.ofLow, s.high, to + 8);
+}
+#else
+struct SpreadGroup {
+    uint32_t set;
+};
+[[gnu::always_inline]] inline SpreadGroup spreadGroup(uint32_t set) { return {set}; }
+template <typename T>
+[[gnu::always_inline]] inline void spreadOut(SpreadGroup s, const T* from, T* to) {
+    for (uint32_t i = 0; i < kTexelGroup; ++i) to[i] = T{};
+    for (uint32_t rest = s.set; rest != 0u; rest &= rest - 1u) to[__builtin_ctz(rest)] = *from++;
+}
+#endif
+
 /// Writes `first` + k for each k < lanes (1 to 8) whose key is no less than `least`, closed up, and says how many they
 /// are; all eight of `to` may be written. (Reads what other threads may be writing: either is right, if no key is torn.
 /// It is assumed that lanes of 8 aligned bytes come whole.)

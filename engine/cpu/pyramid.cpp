@@ -13,7 +13,7 @@ void Pyramid::resize(uint32_t width, uint32_t height, bool hasMaterials) {
     levels_.clear();
     for (uint32_t w = width, h = height;; w = (w + 1) / 2, h = (h + 1) / 2) {
         levels_.emplace_back();
-        levels_.back().resize(w, h, hasMaterials);
+        levels_.back().resize(w, h, hasMaterials, levels_.size() == 1);
         if (w == 1 && h == 1) break;
     }
 }
@@ -30,13 +30,12 @@ void Pyramid::pullPair(const TexelRow& upper, const TexelRow& lower, bool any, u
     }
     out.hasTubes = upper.hasTubes || lower.hasTubes;
     k_.pullRow(upper, lower, n, childSize, frame_.focal, out);
-    to.hold(y, x, n, k_.packRow(out, n, to.planes().at(size_t{y} * to.width + x)));
+    to.hold(y, x, n, k_.packRow(out, n, to.planes(y, x)));
 }
 
 void Pyramid::pull() {
     for (size_t l = 1; l + 1 < levelCount_; ++l) {
         Level &fine = levels_[l], &coarse = levels_[l + 1];
-        const Planes from = fine.planes();
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (!fine.mayHoldTile(x0, n, row0, row1) && !coarse.mayHoldParents(x0, n, row0, row1, false)) return;
             thread_local TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
@@ -46,7 +45,7 @@ void Pyramid::pull() {
                 bool any = false;
                 for (TexelRow* row : {&upper, &lower}) {
                     const uint32_t yy = y + (row == &lower ? 1 : 0);
-                    any = (yy < row1 && loadRow(fine, from, yy, x0, n, *row)) || any;
+                    any = (yy < row1 && loadRow(fine, yy, x0, n, *row)) || any;
                     if (yy >= row1) std::fill_n(row->depth + kPad, n, 0.0f);
                     row->depth[kPad + n] = 0;
                 }
@@ -56,20 +55,31 @@ void Pyramid::pull() {
     }
 }
 
-bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, TexelRow& row,
-                      bool hasNormals) const {
-    const size_t at = size_t{y} * level.width + x;
+bool Pyramid::loadRow(Level& level, uint32_t y, uint32_t x, uint32_t n, TexelRow& row, bool hasNormals) const {
+    if (y + 1 < level.height) askFor(level, y + 1, x, n, hasNormals);
     const uint32_t held = level.held(y, x, n);
-    // (The next row of a tile is a level's width away, where no processor looks by itself.)
-    const uint32_t next = y + 1 < level.height ? level.held(y + 1, x, n) : 0;
-    for (uint32_t rest = next; rest != 0; rest &= rest - 1) {
-        const Planes from = planes.at(at + level.width + static_cast<size_t>(std::countr_zero(rest)) * kTexelGroup);
+    const RowBits closedUp = level.closedUp(y, x);
+    if (!closedUp.isAny()) return loadTexels(level.planes(y, x), held, kPad, n, hasNormals, row);
+    alignas(64) static thread_local std::array<std::array<uint32_t, kTile>, 6> words{};
+    const auto plane = [&](size_t k) { return words.at(k).data(); };
+    const Planes spread{reinterpret_cast<float*>(plane(0)), plane(1), plane(2), plane(3), plane(4),
+                        hasMaterials_ ? plane(5) : nullptr};
+    k_.spreadPacked(level.planesClosedUp(y, x, closedUp.count()), closedUp, hasNormals, spread);
+    return loadTexels(spread, held, kPad, n, hasNormals, row);
+}
+
+void Pyramid::askFor(Level& level, uint32_t y, uint32_t x, uint32_t n, bool hasNormals) {
+    const uint32_t closedUp = level.closedUp(y, x).count();
+    const uint32_t groups =
+        closedUp == 0 ? level.held(y, x, n) : (1u << (closedUp + kTexelGroup - 1) / kTexelGroup) - 1;
+    const Planes row = closedUp == 0 ? level.planes(y, x) : level.planesClosedUp(y, x, closedUp);
+    for (uint32_t rest = groups; rest != 0; rest &= rest - 1) {
+        const Planes from = row.at(static_cast<size_t>(std::countr_zero(rest)) * kTexelGroup);
         __builtin_prefetch(from.depth);
         for (const uint32_t* plane :
              {from.size, from.offset, hasNormals ? from.normal : nullptr, from.colour, from.surface})
             if (plane != nullptr) __builtin_prefetch(plane);
     }
-    return loadTexels(planes.at(at), held, kPad, n, hasNormals, row);
 }
 
 bool Pyramid::loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, bool hasNormals,
@@ -87,20 +97,18 @@ bool Pyramid::loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t 
     return held != 0;
 }
 
-bool Pyramid::loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
-                         CoarseRow& out) const {
+bool Pyramid::loadCoarse(Level& level, float size, int y, uint32_t x0, uint32_t n, CoarseRow& out) const {
     TexelRow& row = out.texels;
     row.hasTubes = hasCurves_;
     row.hasMaterials = hasMaterials_;
     const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
     if (y < 0 || y >= static_cast<int>(level.height)) return false;
     const auto line = static_cast<uint32_t>(y);
-    const auto at = [&](uint32_t x) { return planes.at(size_t{line} * level.width + x); };
-    bool any = loadRow(level, planes, line, c0, count, row), hasTubes = row.hasTubes;
+    bool any = loadRow(level, line, c0, count, row), hasTubes = row.hasTubes;
     const auto loadBeside = [&](bool isInside, uint32_t x, uint32_t to) {
         row.depth[to] = isInside ? 0 : kOutside;
-        if (!isInside || !level.mayHold(line, x, 1) || !(*at(x).depth > 0)) return;
-        any = loadTexels(at(x), 1, to, 1, true, row);
+        if (!isInside || !level.mayHold(line, x, 1) || !(*level.planes(line, x).depth > 0)) return;
+        any = loadTexels(level.planes(line, x), 1, to, 1, true, row);
         hasTubes = hasTubes || row.hasTubes;
     };
     loadBeside(c0 > 0, c0 - 1, kPad - 1);
@@ -117,14 +125,13 @@ void Pyramid::push() {
     for (size_t l = levelCount_; l-- > 1;) {
         if (l + 1 >= levelCount_) continue;
         Level &fine = levels_[l], &coarse = levels_[l + 1];
-        const Planes planes = fine.planes();
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (!fine.mayHoldTile(x0, n, row0, row1) && !coarse.mayHoldParents(x0, n, row0, row1, true)) return;
             pushTile(
                 fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1, false, [](uint32_t) { return ~0u; },
                 [&](uint32_t y, const TexelRow&, const TexelRow& row, bool any) {
                     if (!any) return;
-                    fine.hold(y, x0, n, k_.packRow(row, n, planes.at(size_t{y} * fine.width + x0)));
+                    fine.hold(y, x0, n, k_.packRow(row, n, fine.planes(y, x0)));
                 });
         });
     }

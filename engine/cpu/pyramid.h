@@ -12,9 +12,7 @@
 
 namespace stipple::cpu {
 
-constexpr float kOutside = -1;      ///< depth of a texel outside the image
-constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
-constexpr uint32_t kTileRows = 2 * kBandRows;
+constexpr float kOutside = -1;  ///< depth of a texel outside the image
 
 class Pyramid {
   public:
@@ -61,8 +59,7 @@ class Pyramid {
     void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, Level& to,
                   uint32_t x, uint32_t y, TexelRow& out);
     /// Unpacks n texels of a row; false (and only the depths set) if all are empty.
-    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, TexelRow& row,
-                 bool hasNormals = true) const;
+    bool loadRow(Level& level, uint32_t y, uint32_t x, uint32_t n, TexelRow& row, bool hasNormals = true) const;
 
     /// Pushes coarse into fine over one tile, row by row: use(y, own row, pushed row, any).
     /// wanted(y): groups of texels (kTexelGroup) that are, a bit each; of rows without any nothing is loaded, and `any`
@@ -70,7 +67,6 @@ class Pyramid {
     template <typename Wanted, typename Use>
     void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1,
                   bool coloursAlone, const Wanted& wanted, const Use& use) {
-        const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
         thread_local TexelRow own{}, out{};
         thread_local std::array<CoarseRow, 3> ring{};
         own.hasTubes = out.hasTubes = hasCurves_;
@@ -80,8 +76,7 @@ class Pyramid {
         const auto slotOf = [&](int c) {  // of coarse row c, which is there from here on
             const auto slot = static_cast<size_t>(c + 1) % 3;
             if (held.at(slot) != c) isEmptied.at(slot) = false;
-            if (held.at(slot) != c)
-                has.at(slot) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, c, x0, n, ring.at(slot));
+            if (held.at(slot) != c) has.at(slot) = loadCoarse(coarse, 2 * fineSize, c, x0, n, ring.at(slot));
             held.at(slot) = c;
             return slot;
         };
@@ -93,7 +88,7 @@ class Pyramid {
             }
             const auto c = static_cast<int>(y / 2), beyond = y % 2 == 0 ? c - 1 : c + 1;
             const size_t nearSlot = slotOf(c), farSlot = slotOf(beyond);
-            const bool ownAny = loadRow(fine, finePlanes, y, x0, n, own, !coloursAlone);
+            const bool ownAny = loadRow(fine, y, x0, n, own, !coloursAlone);
             if (!has.at(nearSlot) && !has.at(farSlot)) {
                 use(y, own, own, ownAny);
                 continue;
@@ -116,12 +111,13 @@ class Pyramid {
     }
 
   private:
+    /// Of a row that is loaded soon.
+    static void askFor(Level& level, uint32_t y, uint32_t x, uint32_t n, bool hasNormals);
     /// The same of texels at hand; `held`: groups of them.
     bool loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, bool hasNormals, TexelRow& row) const;
     /// The coarse row `y` around the fine columns [x0, x0 + n), with its discs; false, and nothing is there, outside
     /// the level and where all are empty.
-    bool loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
-                    CoarseRow& out) const;
+    bool loadCoarse(Level& level, float size, int y, uint32_t x0, uint32_t n, CoarseRow& out) const;
 
     Executor& executor_;
     const Kernels& k_;

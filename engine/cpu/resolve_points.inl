@@ -1,16 +1,21 @@
 // From the visibility buffer to the texels of a row: points are gathered and become splats (or, where every pixel that
 // a disc covers is its own, what the pixel shows); other kinds have files of their own. Included by kernels.inl.
 
+/// The points of a row side by side, without the pixels between them.
 struct Gathered {
+    uint32_t count;
+    uint32_t whole;                     // up to a whole group: behind the last point there is nothing
+    alignas(64) uint32_t pixel[kTile];  // of each, from the row's first on
+    RowBits of;                         // the same
     alignas(64) float x[kTile], y[kTile], z[kTile], radius[kTile];
     alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
     alignas(64) uint32_t material[kTile];  // only of frames with materials
     // Of turned instances: normals in camera space.
     alignas(64) float turned[kTile], nx[kTile], ny[kTile], nz[kTile];
     alignas(64) float front[kTile];  // depth by which each was the nearest
-    alignas(64) uint8_t smooth[kTile];
+    uint8_t smooth[kTile];
     alignas(64) uint32_t positionXY[kTile], positionZ[kTile];  // of the records, which are read once
-    alignas(64) const DrawNode* node[kTile];                   // null: no point is shown
+    alignas(64) const DrawNode* node[kTile];                   // null: of blended ones
 };
 
 /// What the points of a row are: flags and masks of all of them.
@@ -46,13 +51,13 @@ template <bool anyTurned>
 /// Texels of the points that were gathered.
 template <bool anyTurned>
 [[gnu::always_inline]] inline void resolveSplats(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
-                                                 size_t first, size_t last, TexelRow& __restrict row) {
+                                                 TexelRow& __restrict row) {
     const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
     const Lens lens = lensHere(focal);
     const float mostScattered = largestSplat(kFlagScattered, focal, f.height), most = largestSplat(0u, focal, f.height);
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
 #pragma GCC ivdep
-    for (size_t i = first; i < last; ++i) {
+    for (size_t i = 0; i < g.whole; ++i) {
         const bool valid = g.z[i] > 0.0f;
         const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
         const vec3 nc = gatheredNormal<anyTurned>(f, g, i, c);
@@ -60,7 +65,7 @@ template <bool anyTurned>
         Texel t = texelFromSplat(c, nc, min(g.radius[i] * support, lensDepth(lens, c.z) * cap), lens, minimum);
         const float scale = focal / lensDepth(lens, c.z);
         // Nearly the pixel's own coordinate is taken off before adding, so that the offset keeps its low bits.
-        t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
+        t.offset = vec2(c.x * scale + centreX - float(int(g.pixel[i])), c.y * scale + centreY);
         t.depth = valid ? t.depth : 0.0f;
         t.radius = valid ? t.radius : 0.0f;
         t.thickness = (g.flags[i] & kFlagLeaf) != 0u ? kLeafThickness * t.radius : t.thickness;
@@ -74,18 +79,18 @@ template <bool anyTurned>
 /// are blended of more than one disc. `isRounded`: as packed texels are.
 template <bool anyTurned, bool hasPlaces, bool isRounded>
 [[gnu::always_inline]] inline void resolveExact(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
-                                                uint32_t n, TexelRow& __restrict row) {
+                                                TexelRow& __restrict row) {
     const float focal = f.focal, support = f.supportScale,
                 mostScattered = largestSplat(kFlagScattered, focal, f.height);
     const Lens lens = lensHere(focal);
     const float x = float(int(x0)) + 0.5f - f.centre.x, py = float(int(y)) + 0.5f - f.centre.y;
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
+    for (size_t i = 0; i < g.whole; ++i) {
         const bool valid = g.front[i] > 0.0f;
         const bool isPlaced = hasPlaces & valid;
         const vec3 c = vec3(isPlaced ? g.x[i] : 0.0f, isPlaced ? g.y[i] : 0.0f, isPlaced ? g.z[i] : 1.0f);
         const vec3 nc = gatheredNormal<anyTurned>(f, g, i, c);
-        const vec3 v = viewDirection(x + float(int(i)), py, lensHere(focal));
+        const vec3 v = viewDirection(x + float(int(g.pixel[i])), py, lensHere(focal));
         const float flip = dot(nc, v) > 0.0f ? -1.0f : 1.0f;
         const vec2 perp = perpFromNormal(nc, v);
         Texel t;
@@ -107,29 +112,50 @@ template <bool anyTurned, bool hasPlaces, bool isRounded>
 }
 
 template <bool anyTurned>
-void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gathered& g, bool hasPlaces, uint32_t x0,
-                   uint32_t y, uint32_t n, TexelRow& row) {
-    if (!in.exactPoints) {
-        for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = row.radius[kPad + i] = 0.0f;
-        forGroups(groupsHeld(n, g.front), n, [&](size_t first, size_t last) __attribute__((always_inline)) {
-            resolveSplats<anyTurned>(f, g, x0, y, first, last, row);
-        });
-    } else if (hasPlaces && row.isRounded)
-        resolveExact<anyTurned, true, true>(f, g, x0, y, n, row);
+void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gathered& g, bool hasPlaces, bool isRounded,
+                   uint32_t x0, uint32_t y, TexelRow& row) {
+    if (!in.exactPoints)
+        resolveSplats<anyTurned>(f, g, x0, y, row);
+    else if (hasPlaces && isRounded)
+        resolveExact<anyTurned, true, true>(f, g, x0, y, row);
     else if (hasPlaces)
-        resolveExact<anyTurned, true, false>(f, g, x0, y, n, row);
-    else if (row.isRounded)
-        resolveExact<anyTurned, false, true>(f, g, x0, y, n, row);
+        resolveExact<anyTurned, true, false>(f, g, x0, y, row);
+    else if (isRounded)
+        resolveExact<anyTurned, false, true>(f, g, x0, y, row);
     else
-        resolveExact<anyTurned, false, false>(f, g, x0, y, n, row);
+        resolveExact<anyTurned, false, false>(f, g, x0, y, row);
     if (row.hasMaterials)
 #pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) {
+        for (size_t i = 0; i < g.whole; ++i) {
             const TexelSurface s = surfaceOfPoint(g.material[i]);
             row.share[kPad + i] = s.share;
             row.metallic[kPad + i] = s.metallic;
             row.roughness[kPad + i] = s.roughness;
         }
+}
+
+/// Texels in their places of a row; depths, radii and materials between them are 0.
+void spreadRow(const ClosedUpRow& closedUp, uint32_t n, TexelRow& row) {
+    constexpr size_t kPlanes = 13, kOfMaterials = 3, kOfNothing = 2;  // those of materials last, the latter first
+    const auto planesOf = [](auto& r) {
+        struct {
+            decltype(&r.depth[0]) of[kPlanes];
+        } p{{r.depth, r.radius, r.thickness, r.x, r.y, r.perpX, r.perpY, r.red, r.green, r.blue, r.share, r.metallic,
+             r.roughness}};
+        return p;
+    };
+    const auto from = planesOf(closedUp.texels);
+    const auto to = planesOf(row);
+    const size_t all = row.hasMaterials ? kPlanes : kPlanes - kOfMaterials;
+    size_t before = kPad;
+    for (uint32_t group = 0; group * kTexelGroup < n; ++group) {
+        const uint32_t bits = closedUp.of.group(group);
+        const SpreadGroup spread = spreadGroup(bits);
+        const size_t at = kPad + size_t{group} * kTexelGroup;
+        const size_t planes = bits != 0u || row.hasMaterials ? all : kOfNothing;
+        for (size_t k = 0; k < planes; ++k) spreadOut(spread, from.of[k] + before, to.of[k] + at);
+        before += size_t(__builtin_popcount(bits));
+    }
 }
 
 /// The pixels of a row that show other kinds than points.
@@ -142,21 +168,21 @@ struct OtherPixels {
     }
 };
 
-/// Pixels that show no point.
-void gatherNothing(uint32_t n, Gathered& g) {
-    for (size_t i = 0; i < kTile; ++i) g.node[i] = nullptr;  // (whole groups of which are looked at)
-#pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
-        g.front[i] = 0;
-        g.normal[i] = 0;
-        g.colour[i] = 0;
+/// There are no more than `count` points.
+void endGathered(uint32_t count, Gathered& g) {
+    g.count = count;
+    g.whole = (count + kTexelGroup - 1u) / kTexelGroup * kTexelGroup;
+    for (size_t i = count; i < g.whole; ++i) {
+        g.pixel[i] = 0;
+        g.front[i] = g.radius[i] = g.turned[i] = 0;
+        g.normal[i] = g.colour[i] = g.positionXY[i] = g.positionZ[i] = 0;
         g.flags[i] = kFlagNoNormal;
         g.material[i] = kPlainPoint;
-        g.turned[i] = 0;
-        g.radius[i] = 0;
+        g.x[i] = g.y[i] = 0;
+        g.z[i] = -1;
+        g.nx[i] = g.ny[i] = g.nz[i] = 0;
+        g.node[i] = nullptr;
     }
-    for (size_t i = 0; i < kTile; ++i) g.positionXY[i] = g.positionZ[i] = 0;
-    for (size_t i = 0; i < n; ++i) g.smooth[i] = 0;
 }
 
 /// All of a point but where its place is in camera space (and of turned nodes its normal).
@@ -210,14 +236,10 @@ template <bool isFirst>
     }
 }
 /// Places of the points of a row: of each few side by side one node after the other, which are mostly one or two.
-void gatherPlaces(uint32_t n, Gathered& g) {
+void gatherPlaces(Gathered& g) {
     constexpr int kNodesTogether = 4;
-    for (size_t first = 0; first < n; first += kTexelGroup) {
+    for (size_t first = 0; first < g.count; first += kTexelGroup) {
         uint32_t left = kWholeGroup & ~equalBits(g.node + first, nullptr);
-        if (left == 0u) {
-            for (size_t i = first; i < first + kTexelGroup; ++i) g.z[i] = -1.0f;
-            continue;
-        }
         for (int nodes = 0; left != 0u; ++nodes) {
             if (nodes == kNodesTogether) {  // as of a forest from afar: one by one
                 for (; left != 0u; left &= left - 1u) {
@@ -248,10 +270,10 @@ struct TurnedPoints {
 };
 /// Normals of turned nodes; of others they are left as they are, and not taken (gatheredNormal). Far away each pixel is
 /// of another node.
-void turnNormals(uint32_t n, Gathered& g) {
+void turnNormals(Gathered& g) {
     TurnedPoints t;
     uint32_t count = 0;
-    for (uint32_t i = 0; i < n; ++i) {
+    for (uint32_t i = 0; i < g.count; ++i) {
         t.at[count] = i;
         count += g.turned[i] > 0.5f ? 1u : 0u;
     }
@@ -299,6 +321,8 @@ void turnNormals(uint32_t n, Gathered& g) {
     g.node[i] = nullptr;
     g.smooth[i] = 0;
     g.front[i] = keyDepth(key);
+    g.radius[i] = 0;
+    g.normal[i] = 0;
     g.turned[i] = 1;
     g.nx[i] = d.x;
     g.ny[i] = d.y;
@@ -317,16 +341,21 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
     // (The next row of the tile is a picture's width away, where no processor looks by itself.)
     for (uint32_t i = 0; hasNext && i < n; i += 8) __builtin_prefetch(visibility + f.width + i, 1);
     for (WinningPixels& p : others.of) p.count = 0;
-    gatherNothing(n, g);
     // The pixels that show something, closed up without branches.
-    alignas(64) uint32_t seen[kTile + 1];
+    alignas(64) uint32_t seen[kTile + kTexelGroup];
     uint64_t keys[kTile];
     const BlockSource* of[kTile];  // null: no record
     uint32_t count = 0;
     const bool hasSeconds = seconds.list != nullptr;
-    for (uint32_t i = 0; i < n; ++i) {
-        seen[count] = i;
-        count += (visibility[i] != kNoKey) | (hasSeconds && seconds.kinds[i] == kSecondFront) ? 1u : 0u;
+    RowBits shown;
+    for (uint32_t first = 0; first < n; first += kTexelGroup) {
+        const uint32_t lanes = n - first < kTexelGroup ? n - first : kTexelGroup;
+        uint32_t bits = shownBits(visibility + first, lanes);
+        for (uint32_t i = 0; hasSeconds && i < lanes; ++i)
+            bits |= (seconds.kinds[first + i] == kSecondFront ? 1u : 0u) << i;
+        storeNumbers(bits, first, seen + count);
+        count += uint32_t(__builtin_popcount(bits));
+        shown.of[first / 64] |= uint64_t{bits} << first % 64;
     }
     // Blocks, their records and their nodes lie anywhere in memory: all of the row are asked for before any is read.
     for (uint32_t k = 0; k < count; ++k) {
@@ -344,16 +373,21 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
         __builtin_prefetch(of[k]->node);
         __builtin_prefetch(reinterpret_cast<const char*>(of[k]->node) + 64);
     }
+    uint32_t points = 0;
     for (uint32_t k = 0; k < count; ++k) {
         const uint32_t i = seen[k];
         const uint64_t key = keys[k];
+        g.pixel[points] = i;
         if (of[k] != nullptr)
-            gatherPoint(f, tables, *of[k], key, g, i, kinds);
+            gatherPoint(f, tables, *of[k], key, g, points++, kinds);
         else if (isPointKey(key, firstBlock))
-            gatherBlended(filtered[i], key, g, i, kinds);
+            gatherBlended(filtered[i], key, g, points++, kinds);
         else if (key != kNoKey)
             gatherOther(key, firstBlock, i, others);
     }
+    endGathered(points, g);
+    if (points == count) g.of = shown;
+    for (uint32_t k = 0; points < count && k < points; ++k) g.of.add(g.pixel[k]);
 }
 
 /// Texels of what is not points; tubes of the row are none before.
@@ -373,9 +407,45 @@ void resolveOthers(const FrameConstants& f, const Tables& tables, const ResolveI
     row.hasTubes = curves.count > 0 && resolveCurves(f, in, curves, x0, y, row, largestRadius);
 }
 
+/// Texels of the points that were gathered, side by side.
+void resolveGathered(const FrameConstants& f, const ResolveInput& in, const GatheredKinds& kinds, bool isRounded,
+                     uint32_t x0, uint32_t y, Gathered& g, TexelRow& row, float& largestRadius) {
+    const bool needsPlaces = in.filtered == nullptr && (!in.exactPoints || in.needsDepths ||
+                                                        (kinds.flags & kFlagNoNormal) != 0u ||
+                                                        (kinds.octantMasks & kNodeSmooth) != 0u);
+    if (needsPlaces) gatherPlaces(g);
+    if (in.filtered == nullptr && kinds.isTurned()) turnNormals(g);
+    if (kinds.isTurned())
+        resolvePoints<true>(f, in, g, needsPlaces, isRounded, x0, y, row);
+    else
+        resolvePoints<false>(f, in, g, needsPlaces, isRounded, x0, y, row);
+    uint largest = 0;  // as bits: positive floats sort like integers
+    for (size_t i = 0; i < g.whole; ++i) {
+        const uint bits = floatBitsToUint(row.radius[kPad + i]);
+        largest = bits > largest ? bits : largest;
+    }
+    largestRadius = max(largestRadius, uintBitsToFloat(largest));
+}
+
+/// The points of a row that has gaps. True if they are all that it shows, and `closedUp` is all of them.
+bool resolveGaps(const FrameConstants& f, const ResolveInput& in, const GatheredKinds& kinds, bool hasOthers,
+                 uint32_t x0, uint32_t y, uint32_t n, Gathered& g, TexelRow& row, ClosedUpRow& closedUp,
+                 float& largestRadius) {
+    TexelRow& texels = closedUp.texels;
+    texels.hasTubes = false;
+    texels.hasMaterials = row.hasMaterials;
+    resolveGathered(f, in, kinds, row.isRounded, x0, y, g, texels, largestRadius);
+    closedUp.count = g.count;
+    closedUp.of = g.of;
+    spreadRow(closedUp, n, row);
+    int isMissed = 0;  // (of those that are nothing after all no group may be left out)
+    for (size_t k = 0; k < g.count; ++k) isMissed |= aboveZero(texels.depth[kPad + k]) == 0 ? 1 : 0;
+    return !hasOthers && isMissed == 0;
+}
+
 bool resolveRow(const FrameConstants& frame, const Tables& tables, const ResolveInput& in, uint64_t* visibility,
-                uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius,
-                const SurfacePlanes& planes) {
+                uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, ClosedUpRow& closedUp,
+                float& largestRadius, const SurfacePlanes& planes) {
     uint32_t* const surface = planes.surface;
     const FrameConstants f = frame;
     Gathered g;
@@ -390,10 +460,14 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         seconds.places += first;
     }
     gatherRow(f, tables, in.blocks, filtered, seconds, visibility, y + 1 < f.height, n, g, others, kinds);
+    closedUp.of = {};
     if (surface != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) surface[i] = 0;
-    for (size_t i = 0; planes.smooth != nullptr && i < n; ++i) planes.smooth[i] = g.smooth[i];
+    if (planes.smooth != nullptr) {
+        for (size_t i = 0; i < n; ++i) planes.smooth[i] = 0;
+        for (size_t k = 0; k < g.count; ++k) planes.smooth[g.pixel[k]] = g.smooth[k];
+    }
     row.isRounded = in.roundsPoints && kinds.any && !others.any() && !row.hasMaterials;
     if (!kinds.any) {
 #pragma GCC ivdep
@@ -404,21 +478,10 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         resolveOthers(f, tables, in, others, x0, y, n, row, largestRadius, planes);
         return others.any();
     }
-    const bool needsPlaces = filtered == nullptr && (!in.exactPoints || in.needsDepths ||
-                                                     (kinds.flags & kFlagNoNormal) != 0u ||
-                                                     (kinds.octantMasks & kNodeSmooth) != 0u);
-    if (needsPlaces) gatherPlaces(n, g);
-    if (filtered == nullptr && kinds.isTurned()) turnNormals(n, g);
-    if (kinds.isTurned())
-        resolvePoints<true>(f, in, g, needsPlaces, x0, y, n, row);
-    else
-        resolvePoints<false>(f, in, g, needsPlaces, x0, y, n, row);
-    uint largest = 0;  // as bits: positive floats sort like integers
-    for (size_t i = 0; i < n; ++i) {
-        const uint bits = floatBitsToUint(row.radius[kPad + i]);
-        largest = bits > largest ? bits : largest;
-    }
-    largestRadius = max(largestRadius, uintBitsToFloat(largest));
+    if (g.count == n)
+        resolveGathered(f, in, kinds, row.isRounded, x0, y, g, row, largestRadius);
+    else if (!resolveGaps(f, in, kinds, others.any(), x0, y, n, g, row, closedUp, largestRadius))
+        closedUp.of = {};
     resolveOthers(f, tables, in, others, x0, y, n, row, largestRadius, planes);
     return true;
 }

@@ -118,14 +118,15 @@ struct Resolved {
     std::vector<uint32_t> surface = std::vector<uint32_t>(cpu::kTile);
     float largest = 0;  ///< radius
     std::unique_ptr<cpu::TexelRow> row = std::make_unique<cpu::TexelRow>();
+    std::unique_ptr<cpu::ClosedUpRow> closedUp = std::make_unique<cpu::ClosedUpRow>();
 
     void resolve(const cpu::Kernels& k, const FrameConstants& f, cpu::ResolveInput in, uint32_t x0, uint32_t y) {
         const cpu::Tables tables = cpu::makeTables();
         const std::array<cpu::ResolveKind, kKindNothing> none{};
         in.ofKind = none.data();
         row->hasTubes = true;
-        ASSERT_TRUE(k.resolveRow(f, tables, in, keys.data(), x0, y, static_cast<uint32_t>(keys.size()), *row, largest,
-                                 {surface.data(), nullptr, nullptr, nullptr}));
+        ASSERT_TRUE(k.resolveRow(f, tables, in, keys.data(), x0, y, static_cast<uint32_t>(keys.size()), *row, *closedUp,
+                                 largest, {surface.data(), nullptr, nullptr, nullptr}));
     }
 };
 

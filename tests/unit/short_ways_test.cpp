@@ -26,10 +26,10 @@ cpu::Kernels countingKernels(const cpu::Kernels& of) {
     counted = &of;
     cpu::Kernels table = of;
     table.resolveRow = [](const FrameConstants& f, const cpu::Tables& t, const cpu::ResolveInput& in, uint64_t* keys,
-                          uint32_t x0, uint32_t y, uint32_t n, cpu::TexelRow& row, float& largest,
-                          const cpu::SurfacePlanes& planes) {
+                          uint32_t x0, uint32_t y, uint32_t n, cpu::TexelRow& row, cpu::ClosedUpRow& closedUp,
+                          float& largest, const cpu::SurfacePlanes& planes) {
         ++resolved;
-        return counted->resolveRow(f, t, in, keys, x0, y, n, row, largest, planes);
+        return counted->resolveRow(f, t, in, keys, x0, y, n, row, closedUp, largest, planes);
     };
     table.showPoints = [](const FrameConstants& f, const cpu::Tables& t, const cpu::BlockSource* blocks,
                           bool tellsSmooth, uint64_t* keys, uint32_t n, uint32_t nothing, uint32_t* rgba) {
@@ -197,7 +197,9 @@ TEST(ShortWays, RoundedTexelsAreThoseThatWerePacked) {
                 in.roundsPoints = rounds;
                 in.ofKind = none.data();
                 auto keys = of.keys;
-                ASSERT_TRUE(k.resolveRow(f, tables, in, keys.data(), 200, 100, cpu::kTile, row, largest, {}));
+                const auto closedUp = std::make_unique<cpu::ClosedUpRow>();
+                ASSERT_TRUE(
+                    k.resolveRow(f, tables, in, keys.data(), 200, 100, cpu::kTile, row, *closedUp, largest, {}));
                 EXPECT_EQ(row.isRounded, rounds);
                 for (const uint64_t key : keys) ASSERT_EQ(key, kNoKey);
             };

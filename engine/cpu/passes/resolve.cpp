@@ -42,13 +42,13 @@ void resolve(Frame& frame) {
     Level& fine = frame.pyramid.level(0);
     Level* coarse = frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
     frame.pyramid.beginFrame(frame.constants, frame.hasCurves);
-    const Planes finePlanes = fine.planes();
     const RowResolver resolver(frame);
     std::atomic<float> largestRadius{0};
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         if (!isTouched(frame, fine, coarse, x0, n, row0, row1)) return;
         thread_local TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
         upper.hasTubes = lower.hasTubes = out.hasTubes = frame.hasCurves;
+        thread_local ClosedUpRow closedUp{};
         upper.hasMaterials = lower.hasMaterials = out.hasMaterials = frame.constants.hasMaterials != 0;
         float largest = 0;
         for (uint32_t y = row0; y < row1; y += 2) {
@@ -65,11 +65,17 @@ void resolve(Frame& frame) {
                     continue;
                 }
                 row->hasTubes = frame.hasCurves;  // may have; the kernel says whether it does
-                const bool has = resolver.resolve(x0, yy, n, *row, largest);
-                if (has)
-                    fine.hold(yy, x0, n, frame.k.packRow(*row, n, finePlanes.at(at)));
-                else
+                const bool has = resolver.resolve(x0, yy, n, *row, closedUp, largest);
+                if (!has) {
                     fine.empty(yy, x0, n);
+                } else if (closedUp.of.isAny()) {
+                    // (Whole groups: what is left of one is gone through one by one.)
+                    const uint32_t whole = (closedUp.count + kTexelGroup - 1) / kTexelGroup * kTexelGroup;
+                    frame.k.packRow(closedUp.texels, whole, fine.planesClosedUp(yy, x0, closedUp.count));
+                    fine.closeUp(yy, x0, closedUp.of);
+                } else {
+                    fine.hold(yy, x0, n, frame.k.packRow(*row, n, fine.planes(yy, x0)));
+                }
                 any = any || has;
             }
             if (!coarse) continue;
@@ -107,10 +113,11 @@ RowResolver::RowResolver(Frame& frame)
     input_.ofKind = ofKind_.data();
 }
 
-bool RowResolver::resolve(uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius) const {
+bool RowResolver::resolve(uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, ClosedUpRow& closedUp,
+                          float& largestRadius) const {
     const size_t at = size_t{y} * frame_.constants.width + x0;
     return frame_.k.resolveRow(frame_.constants, frame_.tables, input_, frame_.visibility.data() + at, x0, y, n, row,
-                               largestRadius, frame_.planesAt(at));
+                               closedUp, largestRadius, frame_.planesAt(at));
 }
 
 void RowResolver::finish() const { std::fill(frame_.runs.begin(), frame_.runs.end(), uint8_t{0}); }

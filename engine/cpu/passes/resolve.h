@@ -21,8 +21,8 @@ class RowResolver {
     RowResolver& operator=(const RowResolver&) = delete;
 
     /// Texels of `n` pixels of row `y` from `x0` on; empties their entries of the visibility buffer. False if nothing
-    /// is there.
-    bool resolve(uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius) const;
+    /// is there. `closedUp`: see Kernels::resolveRow.
+    bool resolve(uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, ClosedUpRow& closedUp, float& largestRadius) const;
     /// All rows that hold something have been resolved.
     void finish() const;
 

@@ -324,8 +324,10 @@ class TileProgram {
         row.isRounded = false;
         row.hasTubes = frame_.hasCurves;  // may have; the kernel says whether it does
         row.hasMaterials = frame_.constants.hasMaterials != 0;
+        thread_local ClosedUpRow closedUp{};
         float largest = 0;
-        const bool any = frame_.isSeen(pixelAt(r.x0, y), r.n) && resolver_.resolve(r.x0, y, r.n, row, largest);
+        const bool any =
+            frame_.isSeen(pixelAt(r.x0, y), r.n) && resolver_.resolve(r.x0, y, r.n, row, closedUp, largest);
         frame_.shownRow(r.x0, y) = any ? 1 : 0;
         return any;
     }
@@ -385,7 +387,7 @@ void pushTexels(Frame& frame, const RowProgram& program, const TileRect& rect) {
     for (uint32_t y = row0; y < row1; ++y) {
         shown.hasTubes = frame.hasCurves;
         shown.hasMaterials = frame.constants.hasMaterials != 0;
-        const bool any = frame.pyramid.loadRow(fine, fine.planes(), y, x0, n, shown);
+        const bool any = frame.pyramid.loadRow(fine, y, x0, n, shown);
         program.run(x0, n, y, shown, shown, any);
     }
 }
