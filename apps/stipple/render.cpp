@@ -17,6 +17,7 @@
 #include "apps/stipple/mode_options.h"
 #include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
+#include "apps/stipple/picture_loader.h"
 #include "apps/stipple/render_frames.h"
 #include "apps/stipple/sun_options.h"
 #include "engine/base/file.h"
@@ -31,7 +32,6 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/open/mesh_files.h"
 #include "engine/scene/open/scene_facts.h"
-#include "lod/store/file_kind.h"
 #include "lod/store/materials.h"
 
 namespace stipple::app {
@@ -161,11 +161,10 @@ Result<void> checkPictures(const RenderCommand& o) {
     return checkOutputs(outputs, inputs, o.force);
 }
 
-/// Before any work. (It takes longer to load than a built scene takes to draw: then only whether it is there.)
-Result<void> checkModule(const RenderCommand& o) {
-    const bool isLong =
-        !o.camera.path.empty() || o.camera.orbit > 0 || !o.exposure.isPlain() || o.drawn.mode == "reference";
-    return image::checkModule(isLong || !lod::isStoreFile(o.inputs.front()));
+/// Before any work; what is drawn for its time is drawn alone.
+Result<void> startLoading(const RenderCommand& o, PictureLoader& pictures) {
+    const bool isTimed = (o.frames > 1 && o.camera.path.empty()) || o.target.isAny();
+    return isTimed ? image::checkModule(false) : pictures.start();
 }
 
 /// What goes beside the error because it is not in it; nothing where nothing is stochastic.
@@ -335,14 +334,14 @@ Result<void> checkWeights(const RenderCommand& o, const OpenedScene& scene) {
                 "build it with: stipple build --surfel-weights, or take --normalise pixel");
 }
 
-Result<void> run(const RenderCommand& o, Written& written) {
+Result<void> run(const RenderCommand& o, PictureLoader& pictures, Written& written) {
     catchStopSignals();
     STIPPLE_TRY(checkPictures(o));
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     STIPPLE_TRY(checkArguments(o));
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
-    STIPPLE_TRY(checkModule(o));
+    STIPPLE_TRY(startLoading(o, pictures));
     STIPPLE_ASSIGN(OpenedScene scene, scene::openScene(o.inputs, o.build.told(o.quiet), *executor));
     STIPPLE_TRY(checkWeights(o, scene));
     const uint64_t hash = o.target.isAny() ? sceneHash(scene) : 0;
@@ -514,10 +513,11 @@ void setupRender(CLI::App& app, int& status) {
     o->sun.addTo(*sub);
     addReading(*sub, *o);
     sub->callback([o, sub, &status] {
+        PictureLoader pictures;
         Written written;
         auto result = checkOfMode(*sub, o->drawn.mode);
-        if (result) result = run(*o, written);
-        if (!result) status = report(toldOf(result.error(), *o, written));
+        if (result) result = run(*o, pictures, written);
+        if (!result) status = report(toldOf(pictures.told(result.error()), *o, written));
     });
 }
 

@@ -12,6 +12,7 @@
 #include "apps/stipple/options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
+#include "apps/stipple/picture_loader.h"
 #include "apps/stipple/render_frames.h"
 #include "apps/stipple/scene_opener.h"
 #include "apps/stipple/view_session.h"
@@ -441,13 +442,12 @@ Result<void> checkScreenshot(const ViewOptions& o) {
     if (o.screenshot.empty()) return {};
     if (o.frames == 0) return fail(ErrorKind::usage, "is taken of the last of --frames N", "--screenshot", "give both");
     STIPPLE_TRY(image::checkImagePath(o.screenshot));
-    STIPPLE_TRY(image::checkModule(true));
     std::vector<std::string> inputs = o.inputs;
     inputs.insert(inputs.end(), {o.camera.path, o.environment.path});
     return checkOutputs({{o.screenshot, OutputKind::picture}}, inputs, o.force);
 }
 
-Result<void> run(const ViewOptions& o) {
+Result<void> run(const ViewOptions& o, PictureLoader& pictures) {
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     STIPPLE_TRY(o.camera.check());
     STIPPLE_TRY(o.material.check(o.shade));
@@ -461,6 +461,7 @@ Result<void> run(const ViewOptions& o) {
                     "use stipple render, or xvfb-run stipple view");
     catchStopSignals();
     const auto executor = makeTbbExecutor(o.build.threads);
+    if (!o.screenshot.empty()) STIPPLE_TRY(pictures.start());
     STIPPLE_ASSIGN(OpenedScene scene, scene::openScene(o.inputs, o.build.told(false), *executor));
     if (o.material.material() && !scene::takesMaterial(scene.placed)) return scene::noPointsToLight(o.inputs.front());
     const uint64_t hash = o.target.isAny() ? sceneHash(scene) : 0;
@@ -552,7 +553,8 @@ void setupView(CLI::App& app, int& status) {
     o->build.addCacheTo(*sub);
     sub->footer(keyHelpText());
     sub->callback([o, &status] {
-        if (const auto result = run(*o); !result) status = report(result.error());
+        PictureLoader pictures;
+        if (const auto result = run(*o, pictures); !result) status = report(pictures.told(result.error()));
     });
 }
 

@@ -44,6 +44,11 @@ void keepFreeMemory(uint64_t memoryBytes, int threads) {
 #endif
 }
 
+bool isAddressSpaceLimited() {
+    rlimit limit{};
+    return ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+}
+
 namespace {
 
 std::atomic<bool> stopRequested{false};

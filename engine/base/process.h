@@ -13,6 +13,8 @@ void releaseFreeMemory();
 /// a share of them is kept, as pages that the system gives anew are cleared first. (Measured: a tenth of a build.)
 /// Before the first thread starts.
 void keepFreeMemory(uint64_t memoryBytes, int threads);
+/// Does `ulimit -v` hold?
+bool isAddressSpaceLimited();
 /// Milliseconds since the kernel started this process (10 ms resolution at worst, Linux), so that "first image" counts
 /// the loading of libraries too.
 double millisecondsSinceProcessStart();

@@ -1,7 +1,5 @@
 // What a command writes is never what it reads, and nothing else is destroyed unasked.
-#include <dlfcn.h>
 #include <gtest/gtest.h>
-#include <link.h>
 #include <sys/stat.h>
 
 #include <filesystem>
@@ -165,28 +163,6 @@ TEST(Overwrite, OtherFilesOnlyWhenTold) {
     expectOneLine(runProgram(folder, "render a.las -o \"\""), 2, {"empty"});
     expectOneLine(runProgram(folder, "build \"\" -o b.stipple"), 2, {"empty"});
     EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
-}
-
-TEST(Overwrite, PicturesThatCannotBeWrittenAreFoundBeforeAnythingIsBuilt) {
-    const test::TempFolder folder;
-    growScan(folder, "a.las");
-    fs::create_directory(folder / "libraries");
-    // Where OpenImageIO lies, the loader knows.
-    void* const module = ::dlopen((fs::path(STIPPLE_PROGRAM).parent_path() / "libstipple_oiio.so").c_str(), RTLD_NOW);
-    ASSERT_NE(module, nullptr) << ::dlerror();
-    std::vector<std::string> names;
-    ::dl_iterate_phdr(
-        [](dl_phdr_info* info, size_t, void* to) {
-            if (const std::string name = fs::path(info->dlpi_name).filename(); name.starts_with("libOpenImageIO.so"))
-                static_cast<std::vector<std::string>*>(to)->push_back(name);
-            return 0;
-        },
-        &names);
-    ASSERT_FALSE(names.empty()) << "the module is not linked with OpenImageIO";
-    for (const std::string& name : names) spit(folder / "libraries/" + name, "no library");
-    const auto render = runProgram(folder, "render a.las -o a.png --size 16x16", "LD_LIBRARY_PATH=libraries");
-    expectOneLine(render, 4, {"picture module"});
-    EXPECT_FALSE(fs::exists(folder / ".cache")) << "nothing was built";
 }
 
 }  // namespace
