@@ -17,6 +17,7 @@ struct ScanOptions {
     std::array<double, 3> origin{0, 0, 0};  ///< added to every coordinate, e.g. UTM or ECEF sized
     int positions = 4;                      ///< of the scanner
     double noiseMetres = 0.003;             ///< standard deviation along the ray
+    int threads = 0, vectorBytes = 64;      ///< at most; 0 threads: all cores. The points are the same
 };
 
 struct ScanPoint {
