@@ -132,7 +132,7 @@ template <typename Number, int kGroup>
             if (isBeside(row0, dx0) || isBeside(row1, dx1) || isBeside(row2, dx2)) continue;
             alignas(64) uint32_t depth[kGroup];
 #pragma GCC ivdep
-            for (size_t k = 0; k < kGroup; ++k) {
+            for (int k = 0; k < kGroup; ++k) {
                 const Number w0 = row0 + Number(k) * dx0, w1 = row1 + Number(k) * dx1, w2 = row2 + Number(k) * dx2;
                 const float linear = of.linearAt(w0, w1, w2);
                 depth[k] = covers(w0, w1, w2) ? floatBitsToUint(depthOfLinear(lensHere(1.0f), linear)) : kPassedBy;
