@@ -36,10 +36,13 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Se
 
 layout(push_constant, scalar) uniform StepBlock { Step stepInfo; };
 
-// Offers a key to a pixel. Most lose by their depth, and need no atomic operation to: keys only fall, so that a depth that
-// was read too early is larger, and hides nothing. (Its word alone: of two words one might be older than the other.)
+// May a key win against one that was read? Most lose by their depth, and need no atomic operation to: keys only fall, so
+// that a depth that was read too early is larger, and hides nothing. (Its word alone: of two words one might be older
+// than the other.)
+bool mayWin(uint64_t key, uint64_t wasRead) { return uint(key >> 32) <= uint(wasRead >> 32); }
+// Offers a key to a pixel.
 void offerKey(uint at, uint64_t key) {
-    if (uint(key >> 32) <= uint(visibility[at] >> 32)) atomicMin(visibility[at], key);
+    if (mayWin(key, visibility[at])) atomicMin(visibility[at], key);
 }
 
 Lens frameLensHere() { return lensOf(frame.focal, frame.orthographic != 0u); }

@@ -93,12 +93,17 @@ void offerFront(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 pi
     const RayOnDisc r = rayOnDisc(d, k, range, pixel);
     const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
     const bool isOpaque = r.isMet > 0.5 || isCentre;
-    if (isOpaque) atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(r.depth + rough * r.along), drawId(0u, d.id)));
+    if (isOpaque) {
+        const uint64_t key = visibilityKey(floatBitsToUint(r.depth + rough * r.along), drawId(0u, d.id));
+        if (mayWin(key, fronts[at].key)) atomicMin(fronts[at].key, key);
+    }
     if (isCentre || !(r.rho2 < frame.kernelSupport * frame.kernelSupport && blendedAmplitude(d, k, frame.nearPlane) > 0.0)) return;
     atomicAdd(fronts[at].count, 1u);
     if (isOpaque) return;
-    atomicMin(fronts[at].first, d.id);
-    atomicMin(fronts[at].nearest, floatBitsToUint(r.depth));
+    // (As keys, they only fall.)
+    const uint depth = floatBitsToUint(r.depth);
+    if (d.id < fronts[at].first) atomicMin(fronts[at].first, d.id);
+    if (depth < fronts[at].nearest) atomicMin(fronts[at].nearest, depth);
 }
 
 int unitsOf(float v) { return int(floor(v + 0.5)); }
@@ -169,7 +174,7 @@ void addKernel(WideDisc d, vec3 colour, TexelSurface surface, float scale, EwaKe
     const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
     const FilteredFront front = fronts[at];
     if (front.key != kNoKey && r.depth > keyDepth(front.key)) {
-        if (r.isMet > 0.5) atomicOr(sums[at].behind, 1u);
+        if (r.isMet > 0.5 && sums[at].behind == 0u) atomicOr(sums[at].behind, 1u);
         return;
     }
     const float support = frame.kernelSupport;
@@ -193,7 +198,7 @@ void addSecond(WideDisc d, float rough, vec3 colour, TexelSurface surface, float
     if (kind == kSecondBehind ? r.depth <= sums[at].nearest || r.depth > keyDepth(front)
         : front != kNoKey     ? r.depth >= sums[at].nearest
                               : r.depth + rough * r.along >= keyDepth(visibility[at])) return;
-    if (kind == kSecondBefore) atomicMin(fronts[at].first, d.id);
+    if (kind == kSecondBefore && d.id < fronts[at].first) atomicMin(fronts[at].first, d.id);
     const float w = scale * blendedAmplitude(d, k, frame.nearPlane) * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
     addSums(at, w, r.depth, colour, towardsEye(d), surface);
 }
@@ -207,5 +212,6 @@ void offerBehind(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 p
     const float depth = r.depth + rough * r.along;
     const uint64_t front = fronts[at].key;
     if (front != kNoKey && !isPointKey(front, frame.firstBlock) && depth >= keyDepth(front)) return;
-    atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(depth), drawId(0u, d.id)));
+    const uint64_t key = visibilityKey(floatBitsToUint(depth), drawId(0u, d.id));
+    if (mayWin(key, front)) atomicMin(fronts[at].key, key);
 }

@@ -9,6 +9,8 @@ void main() {
     LevelPlane at;
     uint texel;
     if (!discHere(d) || !texelOf(d, at, texel)) return;
-    atomicMin(texels[plane(at, 0u) + texel], floatBitsToUint(d.centre.z));
-    atomicMin(texels[plane(at, 2u)], 0u);
+    // What is read may be old, and then is larger: words only fall.
+    const uint place = plane(at, 0u) + texel, depth = floatBitsToUint(d.centre.z), mark = plane(at, 2u);
+    if (depth < texels[place]) atomicMin(texels[place], depth);
+    if (texels[mark] != 0u) atomicMin(texels[mark], 0u);
 }

@@ -9,5 +9,7 @@ void main() {
     LevelPlane at;
     uint texel;
     if (!discHere(d) || !texelOf(d, at, texel)) return;
-    if (texels[plane(at, 0u) + texel] == floatBitsToUint(d.centre.z)) atomicMin(texels[plane(at, 1u) + texel], d.id);
+    if (texels[plane(at, 0u) + texel] != floatBitsToUint(d.centre.z)) return;
+    const uint place = plane(at, 1u) + texel;
+    if (d.id < texels[place]) atomicMin(texels[place], d.id);  // what is read may be old, and then is larger
 }
