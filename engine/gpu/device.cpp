@@ -7,6 +7,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "engine/gpu/needs.h"
+
 namespace stipple::gpu {
 namespace {
 
@@ -304,9 +306,8 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
     properties.pNext = &sizes;
     vkGetPhysicalDeviceProperties2(d->physical, &properties);
     d->limits = {properties.properties.limits.maxStorageBufferRange, sizes.maxBufferSize};
-    if ((subgroups.supportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT) == 0)
-        return fail(ErrorKind::device, "lacks a feature that Stipple needs (arithmetic of subgroups)", d->deviceName,
-                    "try --device cpu");
+    STIPPLE_TRY(checkLimits(properties.properties.limits, d->deviceName));
+    STIPPLE_TRY(checkSubgroups(subgroups, d->deviceName));
 
     uint32_t families = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(d->physical, &families, nullptr);

@@ -21,8 +21,8 @@ struct Shader {
     const char* name;
     std::span<const uint32_t> code;
     std::span<const BindingUse> uses;
-    std::array<uint32_t, 3> group;  ///< threads of a workgroup
-    uint32_t pushBytes;
+    std::array<uint32_t, 3> group;    ///< threads of a workgroup
+    uint32_t pushBytes, sharedBytes;  ///< the latter: of a workgroup
 };
 
 std::span<const Shader> shaders();

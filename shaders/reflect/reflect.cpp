@@ -1,6 +1,6 @@
-// Reads compiled shaders (SPIR-V) and writes a C++ table of them: code, size of a workgroup, bytes of push constants,
-// and of each buffer whether it is read or written and how its elements lie. What a pass uses is thus what its shader
-// says.
+// Reads compiled shaders (SPIR-V) and writes a C++ table of them: code, size of a workgroup and bytes that it shares,
+// bytes of push constants, and of each buffer whether it is read or written and how its elements lie. What a pass uses
+// is thus what its shader says.
 //
 //   stipple_reflect OUT.inc A.spv B.spv ...     names are those of the files
 #include <algorithm>
@@ -44,7 +44,7 @@ enum Op : uint32_t {
     kExecutionModeId = 331
 };
 enum Decoration : uint32_t { kArrayStride = 6, kBinding = 33, kOffset = 35 };
-enum StorageClass : uint32_t { kPushConstant = 9, kStorageBuffer = 12 };
+enum StorageClass : uint32_t { kWorkgroup = 4, kPushConstant = 9, kStorageBuffer = 12 };
 constexpr uint32_t kLocalSize = 17, kLocalSizeId = 38, kMagic = 0x07230203;
 
 struct Type {
@@ -71,6 +71,11 @@ class Module {
     const std::map<uint32_t, Use>& uses() const { return uses_; }
     uint32_t pushBytes() const {
         return pushVariable_ == 0 ? 0 : sizeOfId(types_.at(typeOf_.at(pushVariable_)).operands[1]);
+    }
+    uint32_t sharedBytes() const {
+        uint32_t bytes = 0;
+        for (const uint32_t variable : shared_) bytes += sharedSizeOf(types_.at(typeOf_.at(variable)).operands[1]);
+        return bytes;
     }
     uint32_t groupSize(size_t axis) const { return isSizeById_ ? constants_.at(group_.at(axis)) : group_.at(axis); }
 
@@ -106,6 +111,7 @@ class Module {
                 typeOf_[w[1]] = w[0];
                 root_[w[1]] = w[1];
                 if (w[2] == kPushConstant) pushVariable_ = w[1];
+                if (w[2] == kWorkgroup) shared_.push_back(w[1]);
                 break;
             case kAccessChain:
             case kInBoundsAccessChain:
@@ -177,8 +183,15 @@ class Module {
             bytes = std::max(bytes, offsets_.at(id).at(m) + sizeOfId(t.operands[m]));
         return bytes;
     }
+    /// What a workgroup shares is not laid out: as std430 would, in vectors of three 16 bytes each.
+    uint32_t sharedSizeOf(uint32_t id) const {
+        const Type& t = types_.at(id);
+        if (t.op == kTypeArray) return constants_.at(t.operands[1]) * sharedSizeOf(t.operands[0]);
+        if (t.op == kTypeStruct) throw std::runtime_error("shares a struct, whose size is not known");
+        return t.op == kTypeVector && t.operands[1] == 3 ? 4 * sizeOfId(t.operands[0]) : sizeOf(t);
+    }
 
-    std::vector<uint32_t> words_, group_{1, 1, 1};
+    std::vector<uint32_t> words_, group_{1, 1, 1}, shared_;
     bool isSizeById_ = false;
     uint32_t pushVariable_ = 0;
     std::map<uint32_t, Type> types_;
@@ -207,7 +220,7 @@ void write(std::ostream& out, const std::string& name, const Module& m, std::str
     out << "};\n";
     table += "    {\"" + name + "\", kCode_" + name + ", kUses_" + name + ", {" + std::to_string(m.groupSize(0)) +
              ", " + std::to_string(m.groupSize(1)) + ", " + std::to_string(m.groupSize(2)) + "}, " +
-             std::to_string(m.pushBytes()) + "},\n";
+             std::to_string(m.pushBytes()) + ", " + std::to_string(m.sharedBytes()) + "},\n";
 }
 
 }  // namespace

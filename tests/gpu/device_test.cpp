@@ -1,11 +1,16 @@
 // What a device can hold and which of its queues is taken: limits are asked for, and refused with their name.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <array>
 #include <filesystem>
+#include <map>
 
 #include "engine/base/file.h"
 #include "engine/gpu/gpu_backend.h"
+#include "engine/gpu/needs.h"
+#include "engine/gpu/pipelines.h"
 #include "tests/support/support.h"
 
 namespace stipple::gpu {
@@ -13,6 +18,25 @@ namespace {
 
 VkQueueFamilyProperties family(VkQueueFlags flags, uint32_t timestampBits = 64) {
     return {flags, 1, timestampBits, {1, 1, 1}};
+}
+
+/// By its name in limitsNeeded().
+void setLimit(VkPhysicalDeviceLimits& limits, const std::string& name, uint32_t value) {
+    const std::map<std::string, uint32_t*> places{
+        {"maxComputeWorkGroupInvocations", &limits.maxComputeWorkGroupInvocations},
+        {"maxComputeWorkGroupSize[0]", &limits.maxComputeWorkGroupSize[0]},
+        {"maxComputeWorkGroupSize[1]", &limits.maxComputeWorkGroupSize[1]},
+        {"maxComputeWorkGroupSize[2]", &limits.maxComputeWorkGroupSize[2]},
+        {"maxComputeWorkGroupCount[0]", &limits.maxComputeWorkGroupCount[0]},
+        {"maxComputeSharedMemorySize", &limits.maxComputeSharedMemorySize},
+        {"maxPushConstantsSize", &limits.maxPushConstantsSize},
+        {"maxPerStageDescriptorStorageBuffers", &limits.maxPerStageDescriptorStorageBuffers},
+        {"maxDescriptorSetStorageBuffers", &limits.maxDescriptorSetStorageBuffers},
+        {"maxPerStageDescriptorUniformBuffers", &limits.maxPerStageDescriptorUniformBuffers},
+        {"maxDescriptorSetUniformBuffers", &limits.maxDescriptorSetUniformBuffers},
+        {"maxPerStageResources", &limits.maxPerStageResources},
+        {"maxUniformBufferRange", &limits.maxUniformBufferRange}};
+    *places.at(name) = value;
 }
 
 TEST(Device, AQueueForComputeAloneSufficesWithoutAWindow) {
@@ -59,6 +83,74 @@ TEST(Device, ABufferBeyondALimitIsRefusedByTheNameOfTheLimit) {
     const auto tooLarge = bytes(5000, kCopied);
     ASSERT_FALSE(tooLarge);
     EXPECT_NE(tooLarge.error().line().find("maxBufferSize"), std::string::npos) << tooLarge.error().line();
+}
+
+TEST(Device, ThatHasLessThanShadersAndTheirBuffersAskForIsRefusedInOneLine) {
+    const auto exactly = [] {  // of all limits at once
+        VkPhysicalDeviceLimits limits{};
+        for (const LimitNeeded& l : limitsNeeded()) setLimit(limits, l.name, static_cast<uint32_t>(l.needed));
+        return limits;
+    };
+    EXPECT_TRUE(checkLimits(exactly(), "a card"));
+    std::map<std::string, uint64_t> needed;
+    for (const LimitNeeded& l : limitsNeeded()) {
+        needed[l.name] = l.needed;
+        if (l.needed == 0) continue;
+        VkPhysicalDeviceLimits less = exactly();
+        setLimit(less, l.name, static_cast<uint32_t>(l.needed - 1));
+        const auto refused = checkLimits(less, "a card");
+        ASSERT_FALSE(refused) << l.name;
+        EXPECT_EQ(refused.error().kind, ErrorKind::device);
+        const std::string line = refused.error().line();
+        EXPECT_NE(line.find(fmt::format("{} is {}, and {} is needed", l.name, l.needed - 1, l.needed)),
+                  std::string::npos)
+            << line;
+        EXPECT_NE(line.find("a card"), std::string::npos) << line;
+        EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+    }
+    // What they are of, counted here once more.
+    std::array<uint64_t, 3> edge{};
+    uint64_t threads = 0, tables = 0;
+    for (const Shader& s : shaders()) {
+        threads = std::max<uint64_t>(threads, s.group[0] * s.group[1] * s.group[2]);
+        for (size_t axis = 0; axis < 3; ++axis) edge.at(axis) = std::max<uint64_t>(edge.at(axis), s.group.at(axis));
+        for (const BindingUse& u : s.uses)
+            if (isUniform(u.binding)) tables = std::max<uint64_t>(tables, u.stride);
+    }
+    EXPECT_EQ(needed["maxComputeWorkGroupInvocations"], threads);
+    for (size_t axis = 0; axis < 3; ++axis)
+        EXPECT_EQ(needed[fmt::format("maxComputeWorkGroupSize[{}]", axis)], edge.at(axis));
+    // Corners of a cluster, where they are seen, and whether they are clipped: vec3 (as 16 bytes), ivec2, uint.
+    EXPECT_EQ(shaderNamed("rasterise")->sharedBytes, 256u * (16 + 8 + 4));
+    EXPECT_EQ(shaderNamed("push")->sharedBytes, 0u);
+    EXPECT_GE(needed["maxComputeSharedMemorySize"], shaderNamed("rasterise")->sharedBytes);
+    EXPECT_EQ(needed["maxPushConstantsSize"], sizeof(shared::Step));
+    EXPECT_EQ(needed["maxPerStageDescriptorStorageBuffers"] + needed["maxPerStageDescriptorUniformBuffers"],
+              shared::kBindings);
+    EXPECT_EQ(needed["maxUniformBufferRange"], tables);
+    // No more than what every Vulkan 1.3 device has, or most: work stays possible on small ones.
+    EXPECT_LE(needed["maxComputeWorkGroupInvocations"], 256u);
+    EXPECT_LE(needed["maxComputeSharedMemorySize"], 16384u);
+    EXPECT_LE(needed["maxPushConstantsSize"], 128u);
+    EXPECT_LE(needed["maxPerStageDescriptorStorageBuffers"], 32u);
+}
+
+TEST(Device, WithoutWhatShadersDoWithinSubgroupsIsRefused) {
+    VkPhysicalDeviceSubgroupProperties has{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
+    has.supportedStages = VK_SHADER_STAGE_COMPUTE_BIT;
+    constexpr VkSubgroupFeatureFlags kAll = VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT;
+    has.supportedOperations = kAll;
+    EXPECT_TRUE(checkSubgroups(has, "a card"));
+    for (const auto& [bit, word] :
+         {std::pair{VK_SUBGROUP_FEATURE_BASIC_BIT, "operations"}, {VK_SUBGROUP_FEATURE_ARITHMETIC_BIT, "arithmetic"}}) {
+        has.supportedOperations = kAll & ~VkSubgroupFeatureFlags{bit};
+        const auto refused = checkSubgroups(has, "a card");
+        ASSERT_FALSE(refused) << word;
+        EXPECT_NE(refused.error().line().find(word), std::string::npos) << refused.error().line();
+    }
+    has.supportedOperations = kAll;
+    has.supportedStages = VK_SHADER_STAGE_FRAGMENT_BIT;
+    EXPECT_FALSE(checkSubgroups(has, "a card"));
 }
 
 /// At 4K the pyramid has 221 MB. A device that binds less says so, and goes on with smaller pictures; none is asked for
