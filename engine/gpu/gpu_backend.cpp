@@ -77,6 +77,11 @@ class GpuBackend final : public render::Backend {
         lod::planesOfPatches(chunk.patchBlocks, chunk.patchPlanes, resident.planes);
         return {};
     }
+    Result<DevicePlace> reserve(streaming::ChunkKey key, uint64_t bytes) {
+        STIPPLE_ASSIGN(const PageStore::Place place, allocate(bytes));
+        residents_.add(key).place = place;
+        return DevicePlace{device_.get(), pages_.address(place)};
+    }
     void evict(streaming::ChunkKey key) override {
         residents_.drop(key, [&](const Resident& resident) {
             if (uploads_.drop(pages_.buffer(resident.place), resident.place.offset))
@@ -197,6 +202,12 @@ std::optional<DevicePicture> pictureOf(const render::Backend& backend, render::T
 std::optional<DeviceCounts> secondGroupsOf(const render::Backend& backend, render::Ticket ticket) {
     const auto* gpu = dynamic_cast<const GpuBackend*>(&backend);
     return gpu ? gpu->secondGroups(ticket) : std::nullopt;
+}
+
+Result<DevicePlace> reserve(render::Backend& backend, streaming::ChunkKey key, uint64_t bytes) {
+    auto* const gpu = dynamic_cast<GpuBackend*>(&backend);
+    if (gpu == nullptr) return fail(ErrorKind::device, "has no memory of its own for chunks", backend.name());
+    return gpu->reserve(key, bytes);
 }
 
 std::vector<std::string> validationMessages(const render::Backend& backend) {

@@ -40,6 +40,13 @@ struct DeviceCounts {
 };
 std::optional<DeviceCounts> secondGroupsOf(const render::Backend& backend, render::Ticket ticket);
 
+/// Room for a chunk that commands of the caller fill before the next frame is handed in, instead of Backend::upload.
+struct DevicePlace {
+    const Device* device = nullptr;
+    VkDeviceAddress address = 0;
+};
+Result<DevicePlace> reserve(render::Backend& backend, streaming::ChunkKey key, uint64_t bytes);
+
 /// What the validation layers have said to a backend made by makeGpuBackend.
 std::vector<std::string> validationMessages(const render::Backend& backend);
 

@@ -213,11 +213,11 @@ void write(std::ostream& out, const std::string& name, const Module& m, std::str
     out << "constexpr uint32_t kCode_" << name << "[] = {";
     for (const uint32_t w : m.words()) out << w << "u,";
     out << "};\n";
-    out << "constexpr BindingUse kUses_" << name << "[] = {\n";
+    out << "constexpr std::array<BindingUse, " << m.uses().size() << "> kUses_" << name << "{{\n";
     for (const auto& [binding, u] : m.uses())
         out << "    {" << binding << ", " << u.reads << ", " << u.writes << ", " << u.offset << ", " << u.stride
             << "},\n";
-    out << "};\n";
+    out << "}};\n";
     table += "    {\"" + name + "\", kCode_" + name + ", kUses_" + name + ", {" + std::to_string(m.groupSize(0)) +
              ", " + std::to_string(m.groupSize(1)) + ", " + std::to_string(m.groupSize(2)) + "}, " +
              std::to_string(m.pushBytes()) + ", " + std::to_string(m.sharedBytes()) + "},\n";

@@ -1,10 +1,11 @@
 // What a frame of many records takes on a device, pass by pass, with far more of them resident than any file at hand
-// has: tiles of hilly ground, a node each, whose chunks lie one by one in the device's memory. Of each node the first
-// records are drawn, as a cut draws them. With --replaced so many tiles (1 MiB each) go and come again before each
-// frame. Prints one line of JSON a mode.
+// has: tiles of hilly ground (shaders/shared/ground.h), a node each, whose chunks lie one by one in the device's
+// memory. A compute shader makes them there, and some records of each are read back and compared with the host's; with
+// --filled host all come from the host. Of each node the first records are drawn, as a cut draws them. With --replaced
+// so many tiles (1 MiB each) go and come again before each frame, from the host. Prints one line of JSON a mode.
 //
 //   stipple_gpu_frame [--resident 10000000] [--drawn 10000000] [--size 1920x1080] [--modes pullpush,splat]
-//                     [--frames 50] [--replaced 0] [--device NAME] [--picture PREFIX]
+//                     [--frames 50] [--replaced 0] [--filled device|host] [--device NAME] [--picture PREFIX]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,13 +15,13 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <random>
 #include <sstream>
 
 #include "engine/gpu/gpu_backend.h"
 #include "engine/render/frame_passes.h"
 #include "shaders/shared/surface.h"
+#include "tests/bench/ground_fill.h"
 
 namespace stipple {
 namespace {
@@ -40,6 +41,7 @@ struct Options {
     std::vector<std::string> modes{"pullpush"};
     int frames = 50;
     uint32_t replaced = 0;  ///< tiles before each frame
+    bool fromHost = false;
     std::string device, picture;
 };
 
@@ -62,6 +64,8 @@ Options optionsOf(int argc, char** argv) {
             o.frames = std::stoi(value);
         } else if (name == "--replaced") {
             o.replaced = static_cast<uint32_t>(std::stoul(value));
+        } else if (name == "--filled" && (value == "host" || value == "device")) {
+            o.fromHost = value == "host";
         } else if (name == "--device") {
             o.device = value;
         } else if (name == "--picture") {
@@ -74,24 +78,33 @@ Options optionsOf(int argc, char** argv) {
     return o;
 }
 
-/// Ground of edge 1 in any order, whose hills go on in the next tile. `spacing`: of the records that are drawn.
-std::vector<shared::PointRecord> makeTile(uint32_t seed, double spacing) {
-    std::mt19937 rng(seed);
-    std::vector<shared::PointRecord> records(kOfTile);
-    const auto code = static_cast<uint32_t>(std::clamp(255 + 16 * std::log2(0.8 * spacing), 0.0, 255.0));
-    for (shared::PointRecord& r : records) {
-        const uint32_t x = rng() & 0xffffu, y = rng() & 0xffffu;
-        constexpr double kTurn = 2 * std::numbers::pi, kHill = 0.08;
-        const double u = kTurn * x / 65536, v = kTurn * y / 65536;
-        const double height = 0.5 + kHill * std::sin(u) * std::cos(v);
-        const glm::dvec3 normal = glm::normalize(
-            glm::dvec3(-kHill * kTurn * std::cos(u) * std::cos(v), kHill * kTurn * std::sin(u) * std::sin(v), 1));
-        r.positionXY = x | y << 16;
-        r.positionZRadiusError = static_cast<uint32_t>(height * 65535) | code << 16;
-        r.normal = shared::octEncode(glm::vec3(normal));
-        r.colour = ((rng() & 0x3f3f3fu) + 0x406050u) | shared::kFlagTwoSided << 24;
+/// Of radii. `count`: how many records of a tile are drawn.
+uint32_t radiusCodeOf(uint32_t count) {
+    return static_cast<uint32_t>(std::clamp(255 + 16 * std::log2(0.8 / std::sqrt(count)), 0.0, 255.0));
+}
+lod::Chunk makeTile(uint32_t number, uint32_t radiusCode) {
+    lod::Chunk chunk;
+    chunk.records.resize(kOfTile);
+    for (uint32_t i = 0; i < kOfTile; ++i) chunk.records[i] = shared::groundRecord(number, i, radiusCode);
+    return chunk;
+}
+
+/// All tiles into the device's memory, filled there; of some records of each: that they are what they should be.
+uint64_t fillOnDevice(render::Backend& backend, uint32_t tiles, uint32_t radiusCode) {
+    constexpr uint32_t kSamples = 4;  // of a tile
+    std::vector<gpu::GroundTile> ground;
+    const gpu::Device* device = nullptr;
+    for (uint32_t t = 0; t < tiles; ++t) {
+        const auto place = valueOf(gpu::reserve(backend, {0, t}, uint64_t{kOfTile} * sizeof(shared::PointRecord)));
+        ground.push_back({t, place.address});
+        device = place.device;
     }
-    return records;
+    const auto fill = valueOf(gpu::GroundFill::create(*device));
+    valueOf(fill->fill(ground, kOfTile, radiusCode));
+    if (const uint64_t differ = valueOf(fill->differing(ground, kOfTile, radiusCode, kSamples)); differ > 0)
+        throw std::runtime_error(fmt::format("{} of {} records that were looked at are not what the host makes", differ,
+                                             uint64_t{kSamples} * tiles));
+    return uint64_t{kSamples} * tiles;
 }
 
 lod::View viewOf(const Options& o, double side) {
@@ -195,12 +208,11 @@ int run(int argc, char** argv) {
     render::DrawSettings settings;
     settings.lit = true;
     const Clock::time_point begin = Clock::now();
-    const std::vector<shared::PointRecord> tile = makeTile(7, 1 / std::sqrt(count));
+    const uint32_t radiusCode = radiusCodeOf(count);
+    const uint64_t compared = o.fromHost ? 0 : fillOnDevice(*backend, tiles, radiusCode);
     constexpr uint32_t kAtOnce = 1024;
-    for (uint32_t t = 0; t < tiles; ++t) {
-        lod::Chunk chunk;
-        chunk.records = tile;
-        valueOf(backend->upload({0, t}, std::move(chunk)));
+    for (uint32_t t = 0; o.fromHost && t < tiles; ++t) {
+        valueOf(backend->upload({0, t}, makeTile(t, radiusCode)));
         if (t % kAtOnce != kAtOnce - 1 && t + 1 != tiles) continue;
         lod::View small = view;  // a frame of nothing takes them in
         small.width = small.height = 16;
@@ -211,12 +223,11 @@ int run(int argc, char** argv) {
     const double uploaded = since(begin);
 
     uint32_t next = 0;
+    const lod::Chunk replacement = makeTile(0, radiusCode);
     const auto replace = [&] {
         for (uint32_t i = 0; i < o.replaced; ++i, next = (next + 1) % tiles) {
-            lod::Chunk chunk;
-            chunk.records = tile;
             backend->evict({0, next});
-            valueOf(backend->upload({0, next}, std::move(chunk)));
+            valueOf(backend->upload({0, next}, lod::Chunk(replacement)));
         }
     };
     for (const std::string& name : o.modes) {
@@ -234,7 +245,9 @@ int run(int argc, char** argv) {
         line["size"] = fmt::format("{}x{}", o.width, o.height);
         line["resident"] = uint64_t{tiles} * kOfTile;
         line["drawn"] = drawn;
-        line["upload_ms"] = uploaded;
+        line["filled"] = o.fromHost ? "host" : "device";
+        line["fill_ms"] = uploaded;
+        line["records_compared"] = compared;
         line["replaced"] = o.replaced;
         if (line["passes"].contains("project"))
             line["project_gb_per_s"] =
