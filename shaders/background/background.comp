@@ -5,7 +5,7 @@
 #include "../shared/background.h"
 layout(set = 0, binding = kBackgroundBinding, scalar) uniform BackgroundBlock { BackgroundConstants background; };
 layout(set = 0, binding = kBackdropBinding, scalar) readonly buffer BackdropBlock { uint backdrop[]; };
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 vec3 lightAt(uint level, vec2 place) {
     const BackdropTaps t = backdropTaps(background.first[level], backdropSize(background.width, level), backdropSize(background.height, level), place);

@@ -2,7 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../discs.glsl"
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 PointRecord recordOf(uint id, out DrawNode node) {
     const DrawBlock source = blocks[id / kRecordsPerBlock];
@@ -10,7 +10,8 @@ PointRecord recordOf(uint id, out DrawNode node) {
     return Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kRecordsPerBlock];
 }
 
-shared uint mayCover[64];  // of 64 discs: any of the workgroup's pixels
+const uint kThreads = kPixelTile * kPixelTile;
+shared ivec2 rowsOf[kThreads];  // of as many discs: first and last that may be covered, of those in the workgroup's columns
 shared uint anyHere;
 
 void main() {
@@ -19,7 +20,8 @@ void main() {
     uint64_t key = kNoKey;
     if (isInside) key = visibility[pixel.y * frame.width + pixel.x];
     const bool isDisc = isInside && keyKind(key, frame.firstBlock) == kKindDiscs;
-    if (gl_LocalInvocationID.x == 0u) anyHere = 0u;
+    const uint thread = gl_LocalInvocationIndex;
+    if (thread == 0u) anyHere = 0u;
     barrier();
     if (isDisc) anyHere = 1u;
     barrier();
@@ -42,17 +44,17 @@ void main() {
     vec3 colour = vec3(0.0);
     TexelSurface surface = noSurface();
     const uint count = min(discCount, kDiscCapacity);
-    const int firstX = int(gl_WorkGroupID.x * 64u);
-    for (uint first = 0u; first < count; first += 64u) {
-        const uint mine = first + gl_LocalInvocationID.x;
-        mayCover[gl_LocalInvocationID.x] = 0u;
+    const ivec2 corner = ivec2(gl_WorkGroupID.xy * kPixelTile), end = corner + int(kPixelTile);
+    for (uint first = 0u; first < count; first += kThreads) {
+        const uint mine = first + thread;
+        rowsOf[thread] = ivec2(1, 0);
         if (mine < count) {
             const DiscBox box = discBox(discs[mine], frame);
-            if (box.x.first < firstX + 64 && box.x.last >= firstX && box.y.first <= int(pixel.y) && box.y.last >= int(pixel.y)) mayCover[gl_LocalInvocationID.x] = 1u;
+            if (box.x.first < end.x && box.x.last >= corner.x && box.y.first < end.y && box.y.last >= corner.y) rowsOf[thread] = ivec2(box.y.first, box.y.last);
         }
         barrier();
-        for (uint k = 0u; k < 64u; ++k) {
-            if (mayCover[k] == 0u || !isDisc) continue;
+        for (uint k = 0u; k < kThreads; ++k) {
+            if (!isDisc || int(pixel.y) < rowsOf[k].x || int(pixel.y) > rowsOf[k].y) continue;
             const WideDisc d = discs[first + k];
             const DiscHit hit = discHit(d, ray, frame.nearPlane);
             const float w = discWeight(hit, depth, apart);

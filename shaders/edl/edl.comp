@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../surface.glsl"
 #include "../shared/edl.h"
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 layout(set = 0, binding = kEdlBinding, scalar) uniform EdlBlock { EdlConstants edl; };
 

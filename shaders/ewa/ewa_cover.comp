@@ -4,7 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../filtered.glsl"
 layout(set = 0, binding = kSecondGroupsBinding, scalar) buffer GroupBlock { GroupCounts groups[]; };
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 bool isOpen(ivec2 pixel) {
     if (pixel.x < 0 || pixel.y < 0 || pixel.x >= int(frame.width) || pixel.y >= int(frame.height)) return false;

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../filtered.glsl"
 #include "../shared/surface.h"
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;

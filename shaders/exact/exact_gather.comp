@@ -2,7 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "exact.glsl"
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 void main() {
     const ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

@@ -2,7 +2,11 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../surface.glsl"
 #include "../shared/occlusion.h"
-layout(local_size_x = 64) in;
+#ifdef ALONG_ROWS
+layout(local_size_x = kPixelTile * kPixelTile) in;  // what it reads lies in the row
+#else
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
+#endif
 
 layout(set = 0, binding = kOcclusionBinding, scalar) uniform OcclusionBlock { OcclusionConstants occlusion; };
 layout(set = 0, binding = kOpenBinding, scalar) buffer OpenBlock { float openness[]; };

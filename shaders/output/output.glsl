@@ -19,7 +19,7 @@ layout(set = 0, binding = kFogBinding, scalar) uniform FogBlock { FogConstants f
 #include "../shared/tone.h"
 layout(set = 0, binding = kToneBinding, scalar) uniform ToneBlock { ToneConstants tone; };
 #endif
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 #ifdef LIT
 // What light adds of the picture's mirror images (../reflection), two halves a word.

@@ -3,7 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../patch_splats.glsl"
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 struct PatchSurface {
     vec3 normal;  // of the patch's directions, any length

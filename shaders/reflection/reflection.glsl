@@ -4,7 +4,7 @@
 #include "../light.glsl"
 #include "../shared/reflection.h"
 layout(set = 0, binding = kReflectionBinding, scalar) uniform ReflectionBlock { ReflectionConstants reflection; };
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 vec2 pictureSize() { return vec2(float(frame.width), float(frame.height)); }
 uint entryAt(int x, int y) { return uint(y) * frame.width + uint(x); }

@@ -6,7 +6,7 @@
 #include "../shared/splat_size.h"
 #include "../shared/splat_disc.h"
 layout(set = 0, binding = kFilteredBinding, scalar) readonly buffer FilteredBlock { FilteredPixel filtered[]; };
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;

@@ -57,6 +57,8 @@ const uint kBandRows = 16u;
 const uint kBandGroups = 64u;             // beside each other, one after another through the list
 const uint kGroupsPerDimension = 65535u;  // of blocks: the others are in the next row
 
+const uint kPixelTile = 8u;  // pixels along an edge of a workgroup's
+
 // How many groups there are over blocks, bands and pixels, where the device itself finds out whether there is anything
 // to do: z is 0 until there is.
 struct GroupCounts {

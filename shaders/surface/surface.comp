@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../surface.glsl"
 #include "../shared/smooth.h"
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 layout(set = 0, binding = kTriangleWordsBinding, scalar) readonly buffer TriangleBlock { uint triangleWords[]; };  // two a pixel
 

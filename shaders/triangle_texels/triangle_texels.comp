@@ -3,7 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../mesh.glsl"
-layout(local_size_x = 64) in;
+layout(local_size_x = kPixelTile, local_size_y = kPixelTile) in;
 
 uint byteOf(float v) { return uint(clamp(v, 0.0, 1.0) * 255.0 + 0.5); }
 

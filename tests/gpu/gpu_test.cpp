@@ -476,6 +476,19 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
     EXPECT_GT(compared, 20u);
 }
 
+TEST(Shaders, OverPixelsWorkOnTiles) {
+    // Neighbours read the same records and texels, above and below, too. One reads its row alone; others are a group
+    // of records, which none of 64 threads is.
+    size_t tiles = 0;
+    for (const Shader& shader : shaders()) {
+        if (shader.group[0] * shader.group[1] != shared::kPixelTile * shared::kPixelTile) continue;
+        const bool readsItsRow = std::string(shader.name) == "occlusion_mean_across";
+        EXPECT_EQ(shader.group[1], readsItsRow ? 1u : shared::kPixelTile) << shader.name;
+        ++tiles;
+    }
+    EXPECT_GT(tiles, 20u);
+}
+
 TEST(RangeAllocator, NeverOverlapsAndMergesAll) {
     Rng rng(1);
     RangeAllocator ranges(1 << 16);
