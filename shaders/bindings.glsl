@@ -7,6 +7,7 @@
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/bindings.h"
 #include "shared/frame.h"
 #include "shared/material.h"
@@ -44,6 +45,16 @@ bool mayWin(uint64_t key, uint64_t wasRead) { return uint(key >> 32) <= uint(was
 void offerKey(uint at, uint64_t key) {
     if (mayWin(key, visibility[at])) atomicMin(visibility[at], key);
 }
+
+// A place of its own in a list for each of a subgroup's threads that come by together, of one atomic operation: `length`
+// is the list's, `place` the answer. (In which order they come nothing may hang on.)
+#define TAKE_PLACE(length, place)                                                                                \
+    {                                                                                                            \
+        const uvec4 asking = subgroupBallot(true);                                                               \
+        uint first_ = 0u;                                                                                        \
+        if (subgroupElect()) first_ = atomicAdd(length, subgroupBallotBitCount(asking));                         \
+        place = subgroupBroadcastFirst(first_) + subgroupBallotExclusiveBitCount(asking);                        \
+    }
 
 Lens frameLensHere() { return lensOf(frame.focal, frame.orthographic != 0u); }
 // The ray through a pixel's centre.

@@ -75,7 +75,8 @@ bool isEmptyBox(ivec4 box) { return box.x > box.z || box.y > box.w; }
 // Kept for rasterise_large? Not where the list is full.
 bool isKeptAsLarge(LargeTriangle t, ivec4 box) {
     if ((box.z - box.x + 1) * (box.w - box.y + 1) <= kMostPixels) return false;
-    const uint place = atomicAdd(largeCount, 1u);
+    uint place;
+    TAKE_PLACE(largeCount, place);
     if (place >= kLargeCapacity) return false;
     large[place] = t;
     return true;

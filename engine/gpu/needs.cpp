@@ -74,6 +74,7 @@ Result<void> checkSubgroups(const VkPhysicalDeviceSubgroupProperties& subgroups,
     };
     const char* const missing = lacks(VK_SUBGROUP_FEATURE_BASIC_BIT)        ? "operations of subgroups"
                                 : lacks(VK_SUBGROUP_FEATURE_ARITHMETIC_BIT) ? "arithmetic of subgroups"
+                                : lacks(VK_SUBGROUP_FEATURE_BALLOT_BIT)     ? "ballots of subgroups"
                                                                             : nullptr;
     if (missing == nullptr) return {};
     return fail(ErrorKind::device, fmt::format("lacks a feature that Stipple needs ({})", missing), deviceName,

@@ -145,7 +145,8 @@ void main() {
     const ivec2 to = ivec2(min(hi, vec2(width, height) - 1.0));
     s.box = ivec4(from, to);
     if ((to.x - from.x + 1) * (to.y - from.y + 1) > kMostPixels) {
-        const uint place = atomicAdd(wideCount, 1u);
+        uint place;
+        TAKE_PLACE(wideCount, place);
         if (place < kWideCapacity) {
             wide[place] = s;
             return;

@@ -37,5 +37,6 @@ void main() {
     const bool isBlended = isPointKey(visibility[at], frame.firstBlock);
     coverage[at] = kind << kSecondShift | (isBlended && isAtGap ? filtered[at].cover & 255u : 255u);
     if (kind == kSecondNone) return;
+    if (!subgroupElect()) return;  // one of a subgroup says it
     for (uint shape = 0u; shape < kGroupShapes; ++shape) groups[shape].z = 1u;
 }

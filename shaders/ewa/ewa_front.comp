@@ -31,7 +31,8 @@ void offerOwn() {
     const CentrePixel c = centrePixel(d, frame);
     if (c.x >= 0) offerFront(d, rough, k, range, ivec2(c.x, c.y), true);
     if (size.x * size.y > kMostPixels) {
-        const uint place = atomicAdd(discCount, 1u);
+        uint place;
+        TAKE_PLACE(discCount, place);
         if (place < kDiscCapacity) {
             discs[place] = d;
         } else {

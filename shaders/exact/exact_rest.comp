@@ -25,7 +25,8 @@ void main() {
     const int height = box.y.last - box.y.first + 1;
     if (width <= 0 || height <= 0) return;
     if (width * height > kMostPixels) {
-        const uint place = atomicAdd(discCount, 1u);
+        uint place;
+        TAKE_PLACE(discCount, place);
         if (place < kDiscCapacity) {
             discs[place] = d;
             return;

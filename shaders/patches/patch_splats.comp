@@ -12,7 +12,8 @@ void main() {
     if (!splatOf(number * kBlockLanes + gl_LocalInvocationID.x, s)) return;
     if (isEmptyBox(s.box)) return;
     if ((s.box.z - s.box.x + 1) * (s.box.w - s.box.y + 1) > kMostPixels) {
-        const uint place = atomicAdd(largeCount, 1u);
+        uint place;
+        TAKE_PLACE(largeCount, place);
         if (place < kLargeCapacity) {
             large[place].id = s.id;
             return;

@@ -19,7 +19,8 @@ void project(DrawNode node, PointRecord r, uint block, uint lane) {
         if (isOneSided && !(dot(nodeNormal(node, octDirection(r.normal)), sight) < 0.0)) return;
         const WideDisc d = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + lane, lens);
         if (reachesPicture(d, frame) < 0.5) return;
-        const uint place = atomicAdd(discCount, 1u);
+        uint place;
+        TAKE_PLACE(discCount, place);
         if (place < kDiscCapacity) {
             discs[place] = d;
             return;

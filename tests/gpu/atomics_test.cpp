@@ -21,6 +21,8 @@ enum Op : uint32_t {
     kInBoundsAccessChain = 66,
     kDecorate = 71,
     kCompositeExtract = 81,
+    kAtomicIIncrement = 232,
+    kAtomicIAdd = 234,
     kAtomicSMin = 236,
     kAtomicOr = 241,
     kPhi = 245,
@@ -42,6 +44,8 @@ class Code {
             take(words[at] & 0xffffu, words.subspan(at + 1, (words[at] >> 16) - 1), block);
     }
     const std::vector<Offer>& offers() const { return offers_; }
+    /// Bindings to whose counts threads add, and whether each adds for itself alone.
+    const std::multimap<uint32_t, bool>& added() const { return added_; }
     /// Is its block entered only where a value of the same buffer was looked at?
     bool isReadBefore(const Offer& offer) const {
         const auto condition = conditions_.find(offer.block);
@@ -59,6 +63,9 @@ class Code {
         if ((op == kAccessChain || op == kInBoundsAccessChain) && rooted_.contains(w[2])) rooted_[w[1]] = rooted_[w[2]];
         if (op == kLoad && rooted_.contains(w[2])) loads_[w[1]] = rooted_[w[2]];
         if (op >= kAtomicSMin && op <= kAtomicOr && rooted_.contains(w[2])) offers_.push_back({rooted_[w[2]], block});
+        if (op == kConstant) constants_.insert(w[1]);
+        if (op == kAtomicIIncrement && rooted_.contains(w[2])) added_.emplace(rooted_[w[2]], true);
+        if (op == kAtomicIAdd && rooted_.contains(w[2])) added_.emplace(rooted_[w[2]], constants_.contains(w[5]));
         if (w.size() < 3 || op == kDecorate || op == kVariable || op == kLoad || op == kConstant) return;
         // What a value is made of; literals among the operands of other instructions do no harm.
         std::vector<uint32_t>& parts = parts_[w[1]];
@@ -82,6 +89,8 @@ class Code {
     std::map<uint32_t, uint32_t> bindings_, rooted_, loads_, conditions_;  ///< conditions: by the block they lead to
     std::map<uint32_t, std::vector<uint32_t>> parts_;
     std::vector<Offer> offers_;
+    std::set<uint32_t> constants_;
+    std::multimap<uint32_t, bool> added_;
 };
 
 TEST(Atomics, ReadBeforeTheyOffer) {
@@ -95,6 +104,19 @@ TEST(Atomics, ReadBeforeTheyOffer) {
         }
     }
     EXPECT_GT(offers, 20u);
+}
+
+TEST(Atomics, OfListsAreOneASubgroup) {
+    std::map<uint32_t, size_t> lists;
+    for (const Shader& shader : shaders()) {
+        const Code code(shader.code);
+        for (const uint32_t list : {shared::kDiscsBinding, shared::kLargeBinding, shared::kWideBinding}) {
+            const auto [first, last] = code.added().equal_range(list);
+            for (auto add = first; add != last; ++add, ++lists[list])
+                EXPECT_FALSE(add->second) << shader.name << ": each thread adds to the length of list " << list;
+        }
+    }
+    EXPECT_EQ(lists.size(), 3u);
 }
 
 }  // namespace

@@ -138,11 +138,13 @@ TEST(Device, ThatHasLessThanShadersAndTheirBuffersAskForIsRefusedInOneLine) {
 TEST(Device, WithoutWhatShadersDoWithinSubgroupsIsRefused) {
     VkPhysicalDeviceSubgroupProperties has{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
     has.supportedStages = VK_SHADER_STAGE_COMPUTE_BIT;
-    constexpr VkSubgroupFeatureFlags kAll = VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT;
+    constexpr VkSubgroupFeatureFlags kAll =
+        VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT;
     has.supportedOperations = kAll;
     EXPECT_TRUE(checkSubgroups(has, "a card"));
-    for (const auto& [bit, word] :
-         {std::pair{VK_SUBGROUP_FEATURE_BASIC_BIT, "operations"}, {VK_SUBGROUP_FEATURE_ARITHMETIC_BIT, "arithmetic"}}) {
+    for (const auto& [bit, word] : {std::pair{VK_SUBGROUP_FEATURE_BASIC_BIT, "operations"},
+                                    {VK_SUBGROUP_FEATURE_ARITHMETIC_BIT, "arithmetic"},
+                                    {VK_SUBGROUP_FEATURE_BALLOT_BIT, "ballots"}}) {
         has.supportedOperations = kAll & ~VkSubgroupFeatureFlags{bit};
         const auto refused = checkSubgroups(has, "a card");
         ASSERT_FALSE(refused) << word;
