@@ -96,7 +96,7 @@ Result<void> FrameBuffers::preparePlanes(const render::RenderRequest& request) {
                        "visibility"));
     STIPPLE_TRY(ensure(bound_[kTexelsBinding], gpu::bytesOf(kTexelsBinding, words), kFilled, Memory::device, "texels"));
     STIPPLE_TRY(ensure(bound_[kStatsBinding], gpu::bytesOf(kStatsBinding, 2 * kPyramidLevels),
-                       kFilled | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, Memory::device, "stats"));
+                       kFilled | kCopied | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, Memory::device, "stats"));
     STIPPLE_TRY(ensure(bound_[kSurfaceBinding], gpu::bytesOf(kSurfaceBinding, pixels), kStorage, Memory::device,
                        "surface buffer"));
     STIPPLE_TRY(ensure(bound_[kImageBinding], gpu::bytesOf(kImageBinding, pixels), kCopied, Memory::device, "image"));

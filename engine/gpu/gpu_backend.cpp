@@ -118,10 +118,10 @@ class GpuBackend final : public render::Backend {
         FrameSlot* const slot = slotOf(ticket);
         return slot == nullptr ? Result<void>() : slot->finish(times_);
     }
-    std::optional<DeviceCounts> secondGroups(render::Ticket ticket) const {
+    std::optional<DeviceCounts> counts(render::Ticket ticket, uint32_t binding) const {
         const FrameSlot* const slot = slotOf(ticket);
         if (slot == nullptr || !slot->hasPicture() || !slot->staysOnDevice()) return {};
-        return DeviceCounts{device_.get(), slot->buffers().at(shared::kSecondGroupsBinding).handle()};
+        return DeviceCounts{device_.get(), slot->buffers().at(binding).handle()};
     }
     std::optional<DevicePicture> picture(render::Ticket ticket) const {
         const FrameSlot* const slot = slotOf(ticket);
@@ -201,7 +201,12 @@ std::optional<DevicePicture> pictureOf(const render::Backend& backend, render::T
 
 std::optional<DeviceCounts> secondGroupsOf(const render::Backend& backend, render::Ticket ticket) {
     const auto* gpu = dynamic_cast<const GpuBackend*>(&backend);
-    return gpu ? gpu->secondGroups(ticket) : std::nullopt;
+    return gpu ? gpu->counts(ticket, shared::kSecondGroupsBinding) : std::nullopt;
+}
+
+std::optional<DeviceCounts> levelGroupsOf(const render::Backend& backend, render::Ticket ticket) {
+    const auto* gpu = dynamic_cast<const GpuBackend*>(&backend);
+    return gpu ? gpu->counts(ticket, shared::kStatsBinding) : std::nullopt;
 }
 
 Result<DevicePlace> reserve(render::Backend& backend, streaming::ChunkKey key, uint64_t bytes) {

@@ -39,6 +39,8 @@ struct DeviceCounts {
     VkBuffer counts = VK_NULL_HANDLE;
 };
 std::optional<DeviceCounts> secondGroupsOf(const render::Backend& backend, render::Ticket ticket);
+/// Likewise of levels of the pyramid: StatsBlock in shaders/bindings.glsl.
+std::optional<DeviceCounts> levelGroupsOf(const render::Backend& backend, render::Ticket ticket);
 
 /// Room for a chunk that commands of the caller fill before the next frame is handed in, instead of Backend::upload.
 struct DevicePlace {

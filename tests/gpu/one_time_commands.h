@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "engine/gpu/device.h"
+#include <cstring>
+
+#include "engine/gpu/gpu_backend.h"
 
 namespace stipple::gpu {
 
@@ -39,5 +41,20 @@ class OneTimeCommands {
     VkCommandPool pool_ = VK_NULL_HANDLE;
     VkCommandBuffer commands_ = VK_NULL_HANDLE;
 };
+
+/// What compute shaders have counted, to the host.
+inline void copyCounts(const DeviceCounts& from, void* to, size_t bytes) {
+    auto host = Buffer::create(*from.device, bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::host, "copy");
+    ASSERT_TRUE(host);
+    OneTimeCommands commands(*from.device);
+    const auto counted =
+        bufferBarrier(from.counts, {VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT},
+                      {VK_PIPELINE_STAGE_2_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_READ_BIT});
+    recordBarriers(commands.handle(), {&counted, 1});
+    const VkBufferCopy region{0, 0, bytes};
+    vkCmdCopyBuffer(commands.handle(), from.counts, host->handle(), 1, &region);
+    commands.run();
+    std::memcpy(to, host->mapped(), bytes);
+}
 
 }  // namespace stipple::gpu

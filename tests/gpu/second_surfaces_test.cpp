@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "engine/gpu/gpu_backend.h"
 #include "shaders/shared/bindings.h"
@@ -14,22 +13,6 @@ namespace stipple::gpu {
 namespace {
 
 using Counts = std::array<shared::GroupCounts, shared::kGroupShapes>;
-
-Counts copied(const DeviceCounts& from) {
-    Counts counts{};
-    auto host = Buffer::create(*from.device, sizeof counts, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Memory::host, "copy");
-    EXPECT_TRUE(host);
-    OneTimeCommands commands(*from.device);
-    const auto counted =
-        bufferBarrier(from.counts, {VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT},
-                      {VK_PIPELINE_STAGE_2_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_READ_BIT});
-    recordBarriers(commands.handle(), {&counted, 1});
-    const VkBufferCopy region{0, 0, sizeof counts};
-    vkCmdCopyBuffer(commands.handle(), from.counts, host->handle(), 1, &region);
-    commands.run();
-    std::memcpy(counts.data(), host->mapped(), sizeof counts);
-    return counts;
-}
 
 /// A square of points about the axis, to `half` each way.
 std::vector<test::TestPoint> square(double half, double height, uint32_t colour) {
@@ -68,7 +51,9 @@ TEST(SecondSurfaces, HaveNoGroupsWhereThereAreNone) {
         const auto counts = secondGroupsOf(**backend, *state->onDevice);
         ASSERT_TRUE(counts);
         ASSERT_TRUE((*backend)->finish(*state->onDevice));
-        for (const shared::GroupCounts& c : copied(*counts)) {
+        Counts found{};
+        copyCounts(*counts, found.data(), sizeof found);
+        for (const shared::GroupCounts& c : found) {
             EXPECT_GT(c.x * c.y, 0u);
             EXPECT_EQ(c.z, hasLeaf ? 1u : 0u) << "a leaf: " << hasLeaf;
         }
