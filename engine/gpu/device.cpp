@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstring>
 #include <filesystem>
 
@@ -63,6 +64,16 @@ Result<VkInstance> createInstance(const DeviceSettings& settings, Messages* mess
     if (const VkResult r = vkCreateInstance(&info, nullptr, &instance); r != VK_SUCCESS)
         return vulkanError(r, "no Vulkan instance");
     return instance;
+}
+
+/// All but the first. With the last instance the loader takes drivers out of memory, and loads them again for the next;
+/// but the place of their thread-local variables glibc does not always give back (static TLS), so that a process which
+/// makes device after device finds none some day (VK_ERROR_INCOMPATIBLE_DRIVER). One instance keeps them where they
+/// are.
+void destroyInstance(VkInstance instance) {
+    static std::atomic<VkInstance> kept{VK_NULL_HANDLE};
+    VkInstance none = VK_NULL_HANDLE;
+    if (!kept.compare_exchange_strong(none, instance)) vkDestroyInstance(instance, nullptr);
 }
 
 std::vector<VkPhysicalDevice> physicalDevices(VkInstance instance) {
@@ -336,7 +347,7 @@ Device::~Device() {
             vkGetInstanceProcAddr(instance, "vkDestroyDebugUtilsMessengerEXT"));
         destroy(instance, messenger_, nullptr);
     }
-    if (instance != VK_NULL_HANDLE) vkDestroyInstance(instance, nullptr);
+    if (instance != VK_NULL_HANDLE) destroyInstance(instance);
 }
 
 std::vector<std::string> Device::messages() const {
@@ -439,7 +450,7 @@ std::vector<std::string> deviceNames() {
     const auto instance = createInstance({}, nullptr);
     if (!instance) return names;
     for (VkPhysicalDevice d : physicalDevices(*instance)) names.emplace_back(propertiesOf(d).deviceName);
-    vkDestroyInstance(*instance, nullptr);
+    destroyInstance(*instance);
     return names;
 }
 
@@ -452,7 +463,7 @@ bool hasHardwareDevice() {
     bool found = false;
     for (VkPhysicalDevice d : physicalDevices(*instance))
         found = found || propertiesOf(d).deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU;
-    vkDestroyInstance(*instance, nullptr);
+    destroyInstance(*instance);
     return found;
 }
 

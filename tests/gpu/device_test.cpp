@@ -5,7 +5,9 @@
 
 #include <array>
 #include <filesystem>
+#include <fstream>
 #include <map>
+#include <set>
 
 #include "engine/base/file.h"
 #include "engine/gpu/gpu_backend.h"
@@ -133,6 +135,27 @@ TEST(Device, ThatHasLessThanShadersAndTheirBuffersAskForIsRefusedInOneLine) {
     EXPECT_LE(needed["maxComputeSharedMemorySize"], 16384u);
     EXPECT_LE(needed["maxPushConstantsSize"], 128u);
     EXPECT_LE(needed["maxPerStageDescriptorStorageBuffers"], 32u);
+}
+
+/// Libraries of this process.
+std::set<std::string> loaded() {
+    std::set<std::string> libraries;
+    std::ifstream maps("/proc/self/maps");
+    for (std::string line; std::getline(maps, line);)
+        if (line.find(".so") != std::string::npos) libraries.insert(line.substr(line.find('/')));
+    return libraries;
+}
+
+TEST(Device, MayBeMadeAgainAndAgainAndDriversStayLoaded) {
+    std::set<std::string> with;
+    for (int i = 0; i < 40; ++i) {
+        const auto device = Device::create({});
+        ASSERT_TRUE(device) << "number " << i << ": " << device.error().line();
+        with = loaded();
+    }
+    EXPECT_FALSE(deviceNames().empty());
+    const std::set<std::string> without = loaded();
+    for (const std::string& library : with) EXPECT_TRUE(without.contains(library)) << library;
 }
 
 TEST(Device, WithoutWhatShadersDoWithinSubgroupsIsRefused) {

@@ -29,8 +29,14 @@ class OneTimeCommands {
 
     VkCommandBuffer handle() const { return commands_; }
     void end() { EXPECT_EQ(vkEndCommandBuffer(commands_), VK_SUCCESS); }
-    /// Ends recording; has run when it returns. It waits for `after`.
+    /// Ends recording; has run when it returns, and the host sees what was written. It waits for `after`.
     void run(const SemaphoreValue& after = {}) {
+        VkMemoryBarrier2 written{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
+        written.srcStageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
+        written.srcAccessMask = VK_ACCESS_2_MEMORY_WRITE_BIT;
+        written.dstStageMask = VK_PIPELINE_STAGE_2_HOST_BIT;
+        written.dstAccessMask = VK_ACCESS_2_HOST_READ_BIT;
+        recordBarriers(commands_, {}, &written);
         end();
         EXPECT_TRUE(submitCommands(device_.queue, commands_, after, {}, VK_NULL_HANDLE));
         EXPECT_EQ(vkDeviceWaitIdle(device_.device), VK_SUCCESS);
