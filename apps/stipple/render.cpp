@@ -161,10 +161,11 @@ Result<void> checkPictures(const RenderCommand& o) {
     return checkOutputs(outputs, inputs, o.force);
 }
 
-/// Before any work; what is drawn for its time is drawn alone.
+/// Before any work; what is drawn for its time is drawn alone, and a build before it is not begun in vain.
 Result<void> startLoading(const RenderCommand& o, PictureLoader& pictures) {
     const bool isTimed = (o.frames > 1 && o.camera.path.empty()) || o.target.isAny();
-    return isTimed ? image::checkModule(false) : pictures.start();
+    if (!isTimed) return pictures.start();
+    return image::checkModule(isAddressSpaceLimited() || !lod::isStoreFile(o.inputs.front()));
 }
 
 /// What goes beside the error because it is not in it; nothing where nothing is stochastic.

@@ -33,6 +33,10 @@ constexpr uint32_t kPad = 16;    ///< entries in front of the first one; also ro
 
 constexpr uint32_t kTexelGroup = 16;  ///< texels of a row that are made or left out together
 
+[[gnu::always_inline]] constexpr uint32_t wholeGroups(uint32_t n) {
+    return (n + kTexelGroup - 1) / kTexelGroup * kTexelGroup;
+}
+
 constexpr uint32_t kWidePixel = ~1u;  ///< in the place of a pixel's index: a wide disc
 
 /// A row of unpacked texels; entry x of a tile is at [kPad + x]. Entries -1 and n may be read as neighbours, and what
@@ -67,7 +71,6 @@ struct RowBits {
 /// Texels of a row side by side, without the gaps between them.
 struct ClosedUpRow {
     TexelRow texels;
-    uint32_t count;
     RowBits of;  ///< where they are in the row
 };
 
@@ -79,7 +82,7 @@ struct CoarseRow {
     alignas(64) uint32_t kinds[kSize];
 };
 
-/// One level of the pyramid: five planes of packed texels, and a sixth in frames with materials of points.
+/// Packed texels of a row, or of a part of one: five planes, and a sixth in frames with materials of points.
 struct Planes {
     float* depth;
     uint32_t *size, *offset, *normal, *colour;
@@ -418,7 +421,7 @@ struct Kernels {
     void (*unpackRow)(const Planes& from, uint32_t to, uint32_t n, uint32_t held, bool hasNormals, TexelRow& row);
     /// Packed texels that are closed up, each in its place of a row; of groups without any nothing is written, of
     /// others 0 between them. Reads up to a group more than there are, writes whole groups.
-    void (*spreadPacked)(const Planes& from, const RowBits& of, bool hasNormals, const Planes& to);
+    void (*openUpPacked)(const Planes& from, const RowBits& of, bool hasNormals, const Planes& to);
     void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float focal,
                     TexelRow& out);
     /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy. (x, y): centre of the row's

@@ -278,20 +278,20 @@ void unpackRow(const Planes& planes, uint32_t to, uint32_t n, uint32_t held, boo
         });
 }
 
-void spreadPacked(const Planes& from, const RowBits& of, bool hasNormals, const Planes& to) {
+void openUpPacked(const Planes& from, const RowBits& of, bool hasNormals, const Planes& to) {
     const auto words = [](float* depth) { return reinterpret_cast<uint32_t*>(depth); };
     size_t before = 0;
     for (uint32_t group = 0; group < kTile / kTexelGroup; ++group) {
         const uint32_t bits = of.group(group);
         if (bits == 0u) continue;
-        const SpreadGroup spread = spreadGroup(bits);
+        const OpenGroup open = openGroup(bits);
         const size_t at = size_t{group} * kTexelGroup;
-        spreadOut(spread, words(from.depth) + before, words(to.depth) + at);
-        spreadOut(spread, from.size + before, to.size + at);
-        spreadOut(spread, from.offset + before, to.offset + at);
-        if (hasNormals) spreadOut(spread, from.normal + before, to.normal + at);
-        spreadOut(spread, from.colour + before, to.colour + at);
-        if (from.surface != nullptr) spreadOut(spread, from.surface + before, to.surface + at);
+        openUp(open, words(from.depth) + before, words(to.depth) + at);
+        openUp(open, from.size + before, to.size + at);
+        openUp(open, from.offset + before, to.offset + at);
+        if (hasNormals) openUp(open, from.normal + before, to.normal + at);
+        openUp(open, from.colour + before, to.colour + at);
+        if (from.surface != nullptr) openUp(open, from.surface + before, to.surface + at);
         before += size_t(__builtin_popcount(bits));
     }
 }
@@ -365,7 +365,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               showPoints,
                               packRow,
                               unpackRow,
-                              spreadPacked,
+                              openUpPacked,
                               pullRow,
                               pushRow,
                               coarseDiscs,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -13,8 +14,7 @@
 
 namespace stipple::cpu {
 
-constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
-constexpr uint32_t kTileRows = 2 * kBandRows;
+constexpr uint32_t kTileRows = 32;  ///< of a tile, which is a task
 
 class Level {
   public:
@@ -26,6 +26,7 @@ class Level {
         height = h;
         hasMaterials_ = hasMaterials;
         tiles_ = (w + kTile - 1) / kTile;
+        columns_ = std::min(wholeGroups(w), kTile);
         rowsOfTile_ = std::min(h, kTileRows);
         const size_t bands = (h + rowsOfTile_ - 1) / rowsOfTile_;
         words_.assign(bands * tiles_ * rowsOfTile_ * wordsOfRow() + kTexelGroup, 0);  // (groups are read as wholes)
@@ -34,10 +35,10 @@ class Level {
         filled_.assign(size_t{perRow_} * h, 0);
     }
     /// Of the texels of a row from `x` on, up to the end of the tile.
-    Planes planes(uint32_t y, uint32_t x) { return planesOf(firstOfRow(y, x) + x % kTile, kTile); }
+    Planes planes(uint32_t y, uint32_t x) { return planesOf(firstOfRow(y, x) + x % kTile, columns_); }
     /// Of a row of a tile that is closed up to so many texels, which lie side by side without gaps between planes.
     Planes planesClosedUp(uint32_t y, uint32_t x, uint32_t texels) {
-        return planesOf(firstOfRow(y, x), (texels + kTexelGroup - 1) / kTexelGroup * kTexelGroup);
+        return planesOf(firstOfRow(y, x), wholeGroups(texels));
     }
     /// May any of these texels of a row be there?
     bool mayHold(uint32_t y, uint32_t x, uint32_t n) const {
@@ -64,26 +65,20 @@ class Level {
         const uint8_t* const at = filled_.data() + size_t{y} * perRow_ + x / kSegment;
         return n <= kSegment ? at[0] : at[0] | uint32_t{at[1]} << kSegmentGroups;
     }
-    /// It is these from now on, of which the planes hold all; depths of those that held some before become 0.
+    /// It is these from now on, of which the planes hold all; depths of those that held some before become 0 (but of a
+    /// level whose rows may be closed up: there nothing of groups without any is read).
     void hold(uint32_t y, uint32_t x, uint32_t n, uint32_t groups) {
-        if (!closedUp_.empty()) closedUp_[tileRow(y, x)] = {};
-        uint8_t* const at = filled_.data() + size_t{y} * perRow_ + x / kSegment;
-        const uint32_t gone = held(y, x, n) & ~groups;
-        float* const depth = planes(y, x).depth;
-        for (uint32_t g = 0; gone >> g != 0; ++g)
-            if ((gone >> g & 1u) != 0)
-                std::fill_n(depth + g * kTexelGroup, std::min(kTexelGroup, n - g * kTexelGroup), 0.0f);
-        at[0] = static_cast<uint8_t>(groups & kSegmentMask);
-        if (n > kSegment) at[1] = static_cast<uint8_t>(groups >> kSegmentGroups);
+        if (!closedUp_.empty())
+            closedUp_[tileRow(y, x)] = {};
+        else
+            clear(y, x, n, held(y, x, n) & ~groups);
+        setHeld(y, x, n, groups);
     }
-    /// The row of a tile is these from now on, which the planes hold side by side, from its first place on.
-    void closeUp(uint32_t y, uint32_t x, const RowBits& texels) {
+    /// The row of a tile, of `n` texels, is these from now on; planesClosedUp hold them.
+    void closeUp(uint32_t y, uint32_t x, uint32_t n, const RowBits& texels) {
         uint32_t groups = 0;
-        for (uint32_t g = 0; g < kTile / kTexelGroup; ++g) groups |= (texels.group(g) != 0 ? 1u : 0u) << g;
-        uint8_t* const at = filled_.data() + size_t{y} * perRow_ + x / kSegment;
-        at[0] = static_cast<uint8_t>(groups & kSegmentMask);
-        if (groups >> kSegmentGroups != 0 || x + kSegment < width)
-            at[1] = static_cast<uint8_t>(groups >> kSegmentGroups);
+        for (uint32_t g = 0; g * kTexelGroup < n; ++g) groups |= (texels.group(g) != 0 ? 1u : 0u) << g;
+        setHeld(y, x, n, groups);
         closedUp_[tileRow(y, x)] = texels;
     }
     /// Those of such a row; of none if it is not closed up.
@@ -98,8 +93,20 @@ class Level {
     /// of both.
     static constexpr uint32_t kSegment = kTile / 2, kSegmentGroups = kSegment / kTexelGroup,
                               kSegmentMask = (1u << kSegmentGroups) - 1;
+    void setHeld(uint32_t y, uint32_t x, uint32_t n, uint32_t groups) {
+        uint8_t* const at = filled_.data() + size_t{y} * perRow_ + x / kSegment;
+        at[0] = static_cast<uint8_t>(groups & kSegmentMask);
+        if (n > kSegment) at[1] = static_cast<uint8_t>(groups >> kSegmentGroups);
+    }
+    void clear(uint32_t y, uint32_t x, uint32_t n, uint32_t groups) {
+        float* const depth = planes(y, x).depth;
+        for (uint32_t rest = groups; rest != 0; rest &= rest - 1) {
+            const uint32_t first = static_cast<uint32_t>(std::countr_zero(rest)) * kTexelGroup;
+            std::fill_n(depth + first, std::min(kTexelGroup, n - first), 0.0f);
+        }
+    }
     size_t tileRow(uint32_t y, uint32_t x) const { return size_t{y} * tiles_ + x / kTile; }
-    size_t wordsOfRow() const { return (hasMaterials_ ? size_t{6} : size_t{5}) * kTile; }
+    size_t wordsOfRow() const { return (hasMaterials_ ? size_t{6} : size_t{5}) * columns_; }
     uint32_t* firstOfRow(uint32_t y, uint32_t x) {
         const size_t tile = size_t{y / rowsOfTile_} * tiles_ + x / kTile;
         return words_.data() + (tile * rowsOfTile_ + y % rowsOfTile_) * wordsOfRow();
@@ -109,10 +116,10 @@ class Level {
                 hasMaterials_ ? p + 5 * n : nullptr};
     }
     HugeBuffer<uint32_t> words_;
-    std::vector<RowBits> closedUp_;  ///< of the rows of tiles
-    uint32_t perRow_ = 0, tiles_ = 0, rowsOfTile_ = 1;
+    std::vector<RowBits> closedUp_;                                   ///< of the rows of tiles
+    uint32_t perRow_ = 0, tiles_ = 0, columns_ = 0, rowsOfTile_ = 1;  ///< columns_: of a tile
     bool hasMaterials_ = false;
-    std::vector<uint8_t> filled_;  ///< of each segment its groups: depths of those that hold none are 0 in memory
+    std::vector<uint8_t> filled_;  ///< of each segment its groups
 };
 
 }  // namespace stipple::cpu

@@ -1,6 +1,6 @@
-// Which of the texels of a group are something, and which keys of pixels side by side lie before others: a bit each.
-// Loops that make one number of many lanes are what compilers make worst: GCC 12 moves each mask of AVX-512 to a
-// general register and back. Included by kernels.inl.
+// Which of the texels of a group are something, and which keys side by side lie before others, a bit each; and
+// values that are closed up by such bits, and opened up again. Loops that make one number of many lanes are what
+// compilers make worst: GCC 12 moves each mask of AVX-512 to a general register and back. Included by kernels.inl.
 constexpr uint32_t kWholeGroup = (1u << kTexelGroup) - 1u;
 
 #if defined(__AVX512VL__)
@@ -203,38 +203,38 @@ constexpr ClosedUp kClosedUp;
 /// Values that are closed up, each in its place of a group: those where the set has a bit, 0 in the others. All of the
 /// group are written; up to a group is read.
 #if defined(__AVX512VL__)
-struct SpreadGroup {
+struct OpenGroup {
     __mmask16 there;
 };
-[[gnu::always_inline]] inline SpreadGroup spreadGroup(uint32_t set) { return {static_cast<__mmask16>(set)}; }
+[[gnu::always_inline]] inline OpenGroup openGroup(uint32_t set) { return {static_cast<__mmask16>(set)}; }
 template <typename T>
-[[gnu::always_inline]] inline void spreadOut(SpreadGroup s, const T* from, T* to) {
+[[gnu::always_inline]] inline void openUp(OpenGroup s, const T* from, T* to) {
     _mm512_storeu_si512(to, _mm512_maskz_expand_epi32(s.there, _mm512_loadu_si512(from)));
 }
 #elif defined(__AVX2__)
 /// Of each set of eight lanes: for those that are in it how many are before them, for others a negative number; a byte
 /// each.
-struct Spread {
+struct OpenPlaces {
     uint64_t of[256] = {};
-    constexpr Spread() {
+    constexpr OpenPlaces() {
         for (uint32_t set = 0; set < 256; ++set)
             for (uint32_t lane = 0, count = 0; lane < 8; ++lane)
                 of[set] |= uint64_t{(set >> lane & 1u) != 0u ? count++ : 0x80u} << 8u * lane;
     }
 };
-constexpr Spread kSpreadPlaces;
-struct SpreadGroup {
+constexpr OpenPlaces kOpenPlaces;
+struct OpenGroup {
     __m256i low, high;
     size_t ofLow;
 };
-[[gnu::always_inline]] inline SpreadGroup spreadGroup(uint32_t set) {
+[[gnu::always_inline]] inline OpenGroup openGroup(uint32_t set) {
     const auto of = [](uint32_t eight) {
-        return _mm256_cvtepi8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kSpreadPlaces.of[eight])));
+        return _mm256_cvtepi8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kOpenPlaces.of[eight])));
     };
     return {of(set & 0xffu), of(set >> 8), size_t(__builtin_popcount(set & 0xffu))};
 }
 template <typename T>
-[[gnu::always_inline]] inline void spreadOut(const SpreadGroup& s, const T* from, T* to) {
+[[gnu::always_inline]] inline void openUp(const OpenGroup& s, const T* from, T* to) {
     const auto eight = [](const T* of, __m256i places, T* out) {
         const __m256i read = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(of)),
                       all = _mm256_permutevar8x32_epi32(read, places);
@@ -244,12 +244,12 @@ template <typename T>
     eight(from + s.ofLow, s.high, to + 8);
 }
 #else
-struct SpreadGroup {
+struct OpenGroup {
     uint32_t set;
 };
-[[gnu::always_inline]] inline SpreadGroup spreadGroup(uint32_t set) { return {set}; }
+[[gnu::always_inline]] inline OpenGroup openGroup(uint32_t set) { return {set}; }
 template <typename T>
-[[gnu::always_inline]] inline void spreadOut(SpreadGroup s, const T* from, T* to) {
+[[gnu::always_inline]] inline void openUp(OpenGroup s, const T* from, T* to) {
     for (uint32_t i = 0; i < kTexelGroup; ++i) to[i] = T{};
     for (uint32_t rest = s.set; rest != 0u; rest &= rest - 1u) to[__builtin_ctz(rest)] = *from++;
 }

@@ -56,22 +56,22 @@ void Pyramid::pull() {
 }
 
 bool Pyramid::loadRow(Level& level, uint32_t y, uint32_t x, uint32_t n, TexelRow& row, bool hasNormals) const {
-    if (y + 1 < level.height) askFor(level, y + 1, x, n, hasNormals);
+    const bool isLast = y + 1 == level.height || (y + 1) % kTileRows == 0;  // of the tile: others may be at the next
+    if (!isLast) askFor(level, y + 1, x, n, hasNormals);
     const uint32_t held = level.held(y, x, n);
     const RowBits closedUp = level.closedUp(y, x);
     if (!closedUp.isAny()) return loadTexels(level.planes(y, x), held, kPad, n, hasNormals, row);
     alignas(64) static thread_local std::array<std::array<uint32_t, kTile>, 6> words{};
     const auto plane = [&](size_t k) { return words.at(k).data(); };
-    const Planes spread{reinterpret_cast<float*>(plane(0)), plane(1), plane(2), plane(3), plane(4),
-                        hasMaterials_ ? plane(5) : nullptr};
-    k_.spreadPacked(level.planesClosedUp(y, x, closedUp.count()), closedUp, hasNormals, spread);
-    return loadTexels(spread, held, kPad, n, hasNormals, row);
+    const Planes open{reinterpret_cast<float*>(plane(0)), plane(1), plane(2), plane(3), plane(4),
+                      hasMaterials_ ? plane(5) : nullptr};
+    k_.openUpPacked(level.planesClosedUp(y, x, closedUp.count()), closedUp, hasNormals || hasMaterials_, open);
+    return loadTexels(open, held, kPad, n, hasNormals, row);
 }
 
 void Pyramid::askFor(Level& level, uint32_t y, uint32_t x, uint32_t n, bool hasNormals) {
     const uint32_t closedUp = level.closedUp(y, x).count();
-    const uint32_t groups =
-        closedUp == 0 ? level.held(y, x, n) : (1u << (closedUp + kTexelGroup - 1) / kTexelGroup) - 1;
+    const uint32_t groups = closedUp == 0 ? level.held(y, x, n) : (1u << wholeGroups(closedUp) / kTexelGroup) - 1;
     const Planes row = closedUp == 0 ? level.planes(y, x) : level.planesClosedUp(y, x, closedUp);
     for (uint32_t rest = groups; rest != 0; rest &= rest - 1) {
         const Planes from = row.at(static_cast<size_t>(std::countr_zero(rest)) * kTexelGroup);

@@ -39,14 +39,13 @@ class Pyramid {
     /// Calls body(x0, n, row0, row1) for tiles of `level`: columns [x0, x0 + n), rows [row0, row1), row0 even.
     template <typename Body>
     void forTiles(const Level& level, const Body& body) {
-        const uint32_t columns = (level.width + kTile - 1) / kTile,
-                       bands = (level.height + 2 * kBandRows - 1) / (2 * kBandRows);
+        const uint32_t columns = (level.width + kTile - 1) / kTile, bands = (level.height + kTileRows - 1) / kTileRows;
         executor_.parallelFor(
             size_t{columns} * bands, level.width * level.height < 65536 ? 64 : 1, [&](size_t begin, size_t end) {
                 for (size_t t = begin; t < end; ++t) {
                     const auto x0 = static_cast<uint32_t>(t % columns) * kTile,
-                               row0 = static_cast<uint32_t>(t / columns) * 2 * kBandRows;
-                    body(x0, std::min(kTile, level.width - x0), row0, std::min(level.height, row0 + 2 * kBandRows));
+                               row0 = static_cast<uint32_t>(t / columns) * kTileRows;
+                    body(x0, std::min(kTile, level.width - x0), row0, std::min(level.height, row0 + kTileRows));
                 }
             });
     }
@@ -111,10 +110,10 @@ class Pyramid {
     }
 
   private:
+    /// loadRow, of texels at hand; `held`: groups of them.
+    bool loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, bool hasNormals, TexelRow& row) const;
     /// Of a row that is loaded soon.
     static void askFor(Level& level, uint32_t y, uint32_t x, uint32_t n, bool hasNormals);
-    /// The same of texels at hand; `held`: groups of them.
-    bool loadTexels(const Planes& at, uint32_t held, uint32_t to, uint32_t n, bool hasNormals, TexelRow& row) const;
     /// The coarse row `y` around the fine columns [x0, x0 + n), with its discs; false, and nothing is there, outside
     /// the level and where all are empty.
     bool loadCoarse(Level& level, float size, int y, uint32_t x0, uint32_t n, CoarseRow& out) const;

@@ -15,7 +15,7 @@ struct Gathered {
     alignas(64) float front[kTile];  // depth by which each was the nearest
     uint8_t smooth[kTile];
     alignas(64) uint32_t positionXY[kTile], positionZ[kTile];  // of the records, which are read once
-    alignas(64) const DrawNode* node[kTile];                   // null: of blended ones
+    alignas(64) const DrawNode* node[kTile];                   // null: of blended ones, and behind the last
 };
 
 /// What the points of a row are: flags and masks of all of them.
@@ -135,8 +135,8 @@ void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gather
 }
 
 /// Texels in their places of a row; depths, radii and materials between them are 0.
-void spreadRow(const ClosedUpRow& closedUp, uint32_t n, TexelRow& row) {
-    constexpr size_t kPlanes = 13, kOfMaterials = 3, kOfNothing = 2;  // those of materials last, the latter first
+void openUpRow(const ClosedUpRow& closedUp, uint32_t n, TexelRow& row) {
+    constexpr size_t kPlanes = 13, kOfMaterials = 3, kOfNothing = 2;  // depth and radius first, materials last
     const auto planesOf = [](auto& r) {
         struct {
             decltype(&r.depth[0]) of[kPlanes];
@@ -150,10 +150,10 @@ void spreadRow(const ClosedUpRow& closedUp, uint32_t n, TexelRow& row) {
     size_t before = kPad;
     for (uint32_t group = 0; group * kTexelGroup < n; ++group) {
         const uint32_t bits = closedUp.of.group(group);
-        const SpreadGroup spread = spreadGroup(bits);
+        const OpenGroup open = openGroup(bits);
         const size_t at = kPad + size_t{group} * kTexelGroup;
         const size_t planes = bits != 0u || row.hasMaterials ? all : kOfNothing;
-        for (size_t k = 0; k < planes; ++k) spreadOut(spread, from.of[k] + before, to.of[k] + at);
+        for (size_t k = 0; k < planes; ++k) openUp(open, from.of[k] + before, to.of[k] + at);
         before += size_t(__builtin_popcount(bits));
     }
 }
@@ -171,7 +171,7 @@ struct OtherPixels {
 /// There are no more than `count` points.
 void endGathered(uint32_t count, Gathered& g) {
     g.count = count;
-    g.whole = (count + kTexelGroup - 1u) / kTexelGroup * kTexelGroup;
+    g.whole = wholeGroups(count);
     for (size_t i = count; i < g.whole; ++i) {
         g.pixel[i] = 0;
         g.front[i] = g.radius[i] = g.turned[i] = 0;
@@ -262,7 +262,7 @@ void gatherPlaces(Gathered& g) {
     }
 }
 
-/// Points of turned nodes, closed up: their nodes' axes, and places in the row.
+/// Points of turned nodes, closed up once more: their nodes' axes, and places among those gathered.
 struct TurnedPoints {
     alignas(64) float axes[9][kTile];
     alignas(64) uint32_t normal[kTile], octantMask[kTile], at[kTile + 1];
@@ -435,9 +435,8 @@ bool resolveGaps(const FrameConstants& f, const ResolveInput& in, const Gathered
     texels.hasTubes = false;
     texels.hasMaterials = row.hasMaterials;
     resolveGathered(f, in, kinds, row.isRounded, x0, y, g, texels, largestRadius);
-    closedUp.count = g.count;
     closedUp.of = g.of;
-    spreadRow(closedUp, n, row);
+    openUpRow(closedUp, n, row);
     int isMissed = 0;  // (of those that are nothing after all no group may be left out)
     for (size_t k = 0; k < g.count; ++k) isMissed |= aboveZero(texels.depth[kPad + k]) == 0 ? 1 : 0;
     return !hasOthers && isMissed == 0;

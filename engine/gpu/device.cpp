@@ -310,15 +310,11 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
                                 seen.empty() ? "none" : seen),
                     "--device", "stipple --version lists them");
 
-    VkPhysicalDeviceSubgroupProperties subgroups{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
     VkPhysicalDeviceMaintenance4Properties sizes{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES};
-    sizes.pNext = &subgroups;
     VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
     properties.pNext = &sizes;
     vkGetPhysicalDeviceProperties2(d->physical, &properties);
     d->limits = {properties.properties.limits.maxStorageBufferRange, sizes.maxBufferSize};
-    STIPPLE_TRY(checkLimits(properties.properties.limits, d->deviceName));
-    STIPPLE_TRY(checkSubgroups(subgroups, d->deviceName));
 
     uint32_t families = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(d->physical, &families, nullptr);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "engine/gpu/frame_slot.h"
+#include "engine/gpu/needs.h"
 #include "engine/gpu/pages.h"
 #include "engine/gpu/staging.h"
 #include "engine/render/chunk_table.h"
@@ -23,6 +24,7 @@ class GpuBackend final : public render::Backend {
   public:
     static Result<std::unique_ptr<render::Backend>> create(std::shared_ptr<Device> device,
                                                            const std::string& cacheFolder) {
+        STIPPLE_TRY(checkDevice(device->physical, device->deviceName));  // (a window asks less of one)
         std::unique_ptr<GpuBackend> b(new GpuBackend(std::move(device)));
         STIPPLE_ASSIGN(b->pipelines_, Pipelines::create(*b->device_, cacheFolder));
         STIPPLE_ASSIGN(b->copies_, Copies::create(*b->device_));

@@ -81,4 +81,13 @@ Result<void> checkSubgroups(const VkPhysicalDeviceSubgroupProperties& subgroups,
                 "try --device cpu");
 }
 
+Result<void> checkDevice(VkPhysicalDevice device, const std::string& deviceName) {
+    VkPhysicalDeviceSubgroupProperties subgroups{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
+    VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
+    properties.pNext = &subgroups;
+    vkGetPhysicalDeviceProperties2(device, &properties);
+    STIPPLE_TRY(checkLimits(properties.properties.limits, deviceName));
+    return checkSubgroups(subgroups, deviceName);
+}
+
 }  // namespace stipple::gpu

@@ -23,4 +23,7 @@ Result<void> checkLimits(const VkPhysicalDeviceLimits& limits, const std::string
 /// ... which operations within subgroups there are not.
 Result<void> checkSubgroups(const VkPhysicalDeviceSubgroupProperties& subgroups, const std::string& deviceName);
 
+/// Both of a device.
+Result<void> checkDevice(VkPhysicalDevice device, const std::string& deviceName);
+
 }  // namespace stipple::gpu

@@ -70,9 +70,9 @@ void resolve(Frame& frame) {
                     fine.empty(yy, x0, n);
                 } else if (closedUp.of.isAny()) {
                     // (Whole groups: what is left of one is gone through one by one.)
-                    const uint32_t whole = (closedUp.count + kTexelGroup - 1) / kTexelGroup * kTexelGroup;
-                    frame.k.packRow(closedUp.texels, whole, fine.planesClosedUp(yy, x0, closedUp.count));
-                    fine.closeUp(yy, x0, closedUp.of);
+                    const uint32_t count = closedUp.of.count();
+                    frame.k.packRow(closedUp.texels, wholeGroups(count), fine.planesClosedUp(yy, x0, count));
+                    fine.closeUp(yy, x0, n, closedUp.of);
                 } else {
                     fine.hold(yy, x0, n, frame.k.packRow(*row, n, fine.planes(yy, x0)));
                 }

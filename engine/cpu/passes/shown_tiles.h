@@ -20,7 +20,7 @@ struct TileRect {
 template <typename Shows, typename Empty, typename Work>
 void forShownTiles(Executor& executor, uint32_t width, uint32_t height, const Shows& shows, const Empty& empty,
                    const Work& work) {
-    constexpr uint32_t kRows = 2 * kBandRows;
+    constexpr uint32_t kRows = kTileRows;
     const uint32_t columns = (width + kTile - 1) / kTile, bands = (height + kRows - 1) / kRows;
     const auto rectOf = [&](uint32_t band, uint32_t first, uint32_t last) {
         return TileRect{first * kTile, std::min(width, last * kTile) - first * kTile, band * kRows,
