@@ -193,29 +193,6 @@ TEST(ClosedUpRows, AreNoneWherePointsAreNothing) {
     });
 }
 
-Texel randomTexelOf(Rng& rng) {
-    Texel t{};
-    t.depth = test::uniform(rng, 1, 9);
-    t.radius = test::uniform(rng, 1, 5);
-    t.thickness = test::uniform(rng, 0.1, 2);
-    t.offset = {test::uniform(rng, -2, 2), test::uniform(rng, -2, 2)};
-    t.normalPerp = {test::uniform(rng, -0.7, 0.7), test::uniform(rng, -0.7, 0.7)};
-    t.colour = {test::uniform(rng, 0, 1), test::uniform(rng, 0, 1), test::uniform(rng, 0, 1)};
-    return t;
-}
-void put(cpu::TexelRow& row, size_t i, const Texel& t) {
-    row.depth[i] = t.depth;
-    row.radius[i] = t.radius;
-    row.thickness[i] = t.thickness;
-    row.x[i] = t.offset.x;
-    row.y[i] = t.offset.y;
-    row.perpX[i] = t.normalPerp.x;
-    row.perpY[i] = t.normalPerp.y;
-    row.red[i] = t.colour.x;
-    row.green[i] = t.colour.y;
-    row.blue[i] = t.colour.z;
-}
-
 /// Rows of a level, now closed up, now not, now empty: each is read back as it was written last, whatever was before.
 TEST(ClosedUpRows, AreReadBackFromALevelInTheirPlaces) {
     test::forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
@@ -241,10 +218,10 @@ TEST(ClosedUpRows, AreReadBackFromALevelInTheirPlaces) {
                 fill(closedUp->texels, 0);
                 uint32_t there = 0;
                 for (uint32_t i = 0; i < n; ++i) {
-                    const Texel t = has(bits, i) ? randomTexelOf(rng) : Texel{};
+                    const Texel t = has(bits, i) ? test::randomTexel(rng, false) : Texel{};
                     written[y][x + i] = has(bits, i) ? unpackTexel(packTexel(t)) : Texel{};
-                    put(*row, kPad + i, t);
-                    if (has(bits, i)) put(closedUp->texels, kPad + there++, t);
+                    test::put(*row, kPad + i, t);
+                    if (has(bits, i)) test::put(closedUp->texels, kPad + there++, t);
                 }
                 if (!bits.isAny()) {
                     level.empty(y, x, n);

@@ -27,30 +27,7 @@ PointRecord randomRecord(Rng& rng) {
     r.normal = std::min(r.normal & 0xffffu, 65534u) | std::min(r.normal >> 16, 65534u) << 16;
     return r;
 }
-Texel randomTexel(Rng& rng, bool mayBeEmpty) {
-    Texel t;
-    t.depth = mayBeEmpty && rng.uniform(0, 1) < 0.3 ? 0.0f : uniform(rng, 5, 6);
-    t.radius = uniform(rng, 0.5, 9);
-    t.thickness = t.radius * uniform(rng, 0.05, 1.2);
-    t.offset = {uniform(rng, -1, 1), uniform(rng, -1, 1)};
-    t.normalPerp = {uniform(rng, -0.7, 0.7), uniform(rng, -0.7, 0.7)};
-    t.colour = {uniform(rng, 0, 1), uniform(rng, 0, 1), uniform(rng, 0, 1)};
-    t.isRound = 0;
-    t.axis = {0, 0};
-    return t;
-}
-void put(cpu::TexelRow& row, size_t i, const Texel& t) {
-    row.depth[i] = t.depth;
-    row.radius[i] = t.radius;
-    row.thickness[i] = t.thickness;
-    row.x[i] = t.offset.x;
-    row.y[i] = t.offset.y;
-    row.perpX[i] = t.normalPerp.x;
-    row.perpY[i] = t.normalPerp.y;
-    row.red[i] = t.colour.x;
-    row.green[i] = t.colour.y;
-    row.blue[i] = t.colour.z;
-}
+
 TEST(KernelFormulas, DiscsAreThoseOfSplatDisc) {
     forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
         Rng rng(1);
