@@ -65,27 +65,6 @@ TEST(ClosedUpRows, AreOpenedUpToTheirPlaces) {
     });
 }
 
-/// Points of one block, of which a row shows some.
-struct SomeShown {
-    SomeShown(Rng& rng, double share) : node(test::randomNode(rng)), records(kRecordsPerBlock) {
-        const auto word = [&] { return static_cast<uint32_t>(rng.below(uint64_t{1} << 32)); };
-        for (PointRecord& r : records) {
-            r = {word(), word(), word(), word()};
-            r.normal = std::min(r.normal & 0xffffu, 65534u) | std::min(r.normal >> 16, 65534u) << 16;
-        }
-        for (uint64_t& key : keys)
-            key = rng.uniform(0, 1) < share
-                      ? visibilityKey(floatBitsToUint(test::uniform(rng, 3, 9)), rng.below(kRecordsPerBlock))
-                      : kNoKey;
-        keys[rng.below(kTile)] = visibilityKey(floatBitsToUint(5.0f), 0);  // one at least
-        block = {.records = records.data(), .node = &node};
-    }
-    DrawNode node;
-    std::vector<PointRecord> records;
-    std::array<uint64_t, kTile> keys{};
-    cpu::BlockSource block;
-};
-
 /// Planes of a row whose values are of the texels that are there.
 std::vector<const float*> planesOf(const cpu::TexelRow& row) {
     return {row.depth, row.radius, row.thickness, row.x,     row.y,        row.perpX,    row.perpY,
@@ -105,7 +84,7 @@ struct ResolvedRow {
     std::unique_ptr<cpu::ClosedUpRow> closedUp = std::make_unique<cpu::ClosedUpRow>();
     float largest = 0;
 
-    void resolve(const cpu::Kernels& k, const FrameConstants& f, const SomeShown& of, uint32_t n, bool isExact,
+    void resolve(const cpu::Kernels& k, const FrameConstants& f, const test::SomeShown& of, uint32_t n, bool isExact,
                  std::array<uint64_t, kTile> keys) {
         static const cpu::Tables tables = cpu::makeTables();
         static const std::array<cpu::ResolveKind, kKindNothing> none{};
@@ -135,7 +114,7 @@ TEST(ClosedUpRows, AreTheTexelsOfTheRowWithoutGaps) {
         for (int round = 0; round < 140; ++round) {
             const uint32_t n = round % 5 == 0 ? 77 : kTile;
             const bool isExact = round % 2 == 0;
-            SomeShown of(rng, kShares.at(static_cast<size_t>(round) % kShares.size()));
+            test::SomeShown of(rng, kShares.at(static_cast<size_t>(round) % kShares.size()));
             of.node.base = {0, 0, 12};
             of.keys[0] = visibilityKey(floatBitsToUint(5.0f), 0);
             f.hasMaterials = round % 3 == 0 ? 1 : 0;
@@ -184,7 +163,7 @@ TEST(ClosedUpRows, AreNoneWherePointsAreNothing) {
         f.firstBlock.of[kKindCurves] = f.firstBlock.of[kKindTriangles] = f.firstBlock.of[kKindPatches] =
             f.firstBlock.of[kKindDiscs] = 1;
         Rng rng(8);
-        SomeShown of(rng, 0.3);
+        test::SomeShown of(rng, 0.3);
         of.node.base = {0, 0, -12};  // behind the eye; no frame claims pixels for such
         ResolvedRow row;
         row.resolve(k, f, of, kTile, false, of.keys);

@@ -137,6 +137,27 @@ inline FrameConstants withRanges(FrameConstants f) {
     return f;
 }
 
+/// Points of one block, of which a row shows some.
+struct SomeShown {
+    SomeShown(Rng& rng, double share) : node(randomNode(rng)), records(kRecordsPerBlock) {
+        const auto word = [&] { return static_cast<uint32_t>(rng.below(uint64_t{1} << 32)); };
+        for (PointRecord& r : records) {
+            r = {word(), word(), word(), word()};
+            r.normal = std::min(r.normal & 0xffffu, 65534u) | std::min(r.normal >> 16, 65534u) << 16;
+        }
+        for (uint64_t& key : keys)
+            key = rng.uniform(0, 1) < share
+                      ? visibilityKey(floatBitsToUint(uniform(rng, 3, 9)), rng.below(kRecordsPerBlock))
+                      : kNoKey;
+        keys[rng.below(cpu::kTile)] = visibilityKey(floatBitsToUint(5.0f), 0);  // one at least
+        block = {.records = records.data(), .node = &node};
+    }
+    DrawNode node;
+    std::vector<PointRecord> records;
+    std::array<uint64_t, cpu::kTile> keys{};
+    cpu::BlockSource block;
+};
+
 /// A row of pixels of one kind, resolved.
 struct Resolved {
     std::vector<uint64_t> keys;

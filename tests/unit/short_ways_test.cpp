@@ -156,26 +156,6 @@ TEST(ShortWays, EveryByteIsShownAsOutputShowsIt) {
     });
 }
 
-/// Records of a node that pixels of a row show.
-struct ShownRecords {
-    explicit ShownRecords(Rng& rng) : node(test::randomNode(rng)), records(kRecordsPerBlock) {
-        const auto word = [&] { return static_cast<uint32_t>(rng.below(uint64_t{1} << 32)); };
-        for (PointRecord& r : records) {
-            r = {word(), word(), word(), word()};
-            r.normal = std::min(r.normal & 0xffffu, 65534u) | std::min(r.normal >> 16, 65534u) << 16;
-        }
-        for (uint64_t& key : keys)
-            key = rng.uniform(0, 1) < 0.2
-                      ? kNoKey
-                      : visibilityKey(floatBitsToUint(uniform(rng, 3, 9)), rng.below(kRecordsPerBlock));
-        block = {.records = records.data(), .node = &node};
-    }
-    DrawNode node;
-    std::vector<PointRecord> records;
-    std::array<uint64_t, cpu::kTile> keys;
-    cpu::BlockSource block;
-};
-
 TEST(ShortWays, RoundedTexelsAreThoseThatWerePacked) {
     const cpu::Tables tables = cpu::makeTables();
     test::forKernels([&](const cpu::Kernels& k, FrameConstants f) {
@@ -186,7 +166,7 @@ TEST(ShortWays, RoundedTexelsAreThoseThatWerePacked) {
         double worst = 0;
         size_t compared = 0;
         for (int round = 0; round < 100; ++round) {
-            ShownRecords of(rng);
+            const test::SomeShown of(rng, 0.8);
             const auto packed = std::make_unique<cpu::TexelRow>(), rounded = std::make_unique<cpu::TexelRow>();
             std::vector<uint32_t> words(size_t{6} * cpu::kTile);
             float largest = 0;
