@@ -41,7 +41,7 @@ MissingChunks missingOf(const render::FrameState& state) {
     }
     uint64_t toRead = state.streamer->counters().failures > 0 ? 1000 : 0;  // that many say enough
     for (const lod::CutWanted& w : state.cut.wanted) {
-        const auto chunk = toRead > 0 ? lod::readChunk(*storeOf[w.source], w.chunk) : Result<lod::Chunk>();
+        const auto chunk = toRead > 0 ? lod::readDrawnChunk(*storeOf[w.source], w.chunk) : Result<lod::Chunk>();
         toRead -= toRead > 0 ? 1 : 0;
         ++(chunk ? missing.noRoom : missing.unreadable);
         if (!chunk) missing.failure = chunk.error().line();

@@ -42,7 +42,7 @@ Result<LoosePatches> LoosePatches::of(const std::vector<lod::Patch>& patches) {
 Result<render::Image> LoosePatches::draw(render::Backend& backend, const lod::View& view, render::Mode mode,
                                          const render::DrawSettings& settings) const {
     lod::Cut cut;
-    cut.draw.push_back({0, 0, 0, hierarchy_.nodes[0].records, 255, 0, 1, 1});
+    cut.draw.push_back({.count = hierarchy_.nodes[0].records, .errorCode = 255, .errorPixels = 1});
     const lod::Hierarchy* all = &hierarchy_;
     const lod::Instance place;
     render::DrawList draws;

@@ -123,7 +123,7 @@ std::span<const uint32_t> HiddenNodes::begin(const Frame& frame, bool mayHide) {
     // What is told must not hang on frames before: everything is drawn first then, and all is held against all.
     if (isTested_ && hasMarks_ && !frame.tellsHiddenNodes)
         for (size_t n = 0; n < states_.size(); ++n)
-            if (points.nodes[n].count >= kLeastRecords && marks_.has(hashOfNode(points.keys[n], points.instances[n])))
+            if (points.records[n] >= kLeastRecords && marks_.has(hashOfNode(points.keys[n], points.instances[n])))
                 states_[n] = kHeld;
     take(points, kDrawn, blocks_);
     return blocks_;
@@ -167,7 +167,7 @@ std::span<const uint32_t> HiddenNodes::rest(Frame& frame, bool areDiscs) {
     behind_.assign(states_.size(), 0);
     frame.executor.parallelFor(states_.size(), 64, [&](size_t begin, size_t end) {
         for (size_t n = begin; n < end; ++n) {
-            if (points.nodes[n].count < kLeastRecords) continue;
+            if (points.records[n] < kLeastRecords) continue;
             render::NodeBounds bounds = frame.draws->pointBounds[n];
             const auto isHidden = [&](bool grow) {
                 return isBehind(reachOf(frame.constants, points.nodes[n], bounds, areDiscs || grow, frame.hasPyramid));
@@ -184,7 +184,7 @@ std::span<const uint32_t> HiddenNodes::rest(Frame& frame, bool areDiscs) {
     marks_.clear(states_.size());
     whole_.clear();
     for (size_t n = 0; n < states_.size(); ++n) {
-        const uint32_t count = points.nodes[n].count;
+        const uint32_t count = points.records[n];
         all += count;
         if (behind_[n] == kWholeBehind) whole_.push_back(static_cast<uint32_t>(n));
         if (behind_[n] != kBefore) {

@@ -14,7 +14,7 @@ using glm::dvec3;
 
 /// Do discs of a node reach only a few of each other's spacings? Where they reach farther none is filled exactly, but
 /// in parallel views those that no texel holds.
-bool mayBeWide(const lod::Hierarchy& h, const lod::Node& node, const std::vector<shared::PointRecord>& records,
+bool mayBeWide(const lod::Hierarchy& h, const lod::Node& node, std::span<const shared::PointRecord> records,
                const lod::View& view, double scale) {
     double most = 0;
     for (const shared::PointRecord& r : records) most = std::max(most, decodeDisc(h, node, r).radius);
@@ -24,7 +24,7 @@ bool mayBeWide(const lod::Hierarchy& h, const lod::Node& node, const std::vector
 
 /// Are usual discs of a node, by the mean of their radius codes, wider than eight pixels at the middle of its cell?
 bool areFacets(const render::DrawList& draws, const lod::CutDraw& cut, const render::Bend* bend,
-               const std::vector<shared::PointRecord>& records) {
+               std::span<const shared::PointRecord> records) {
     const lod::View& v = draws.view;
     const lod::Instance& instance = draws.instances[cut.instance];
     const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
@@ -126,17 +126,27 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const lod::Chunk& chunk = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk);
         const auto& records = chunk.records;
         if (records.empty()) continue;  // of another kind
-        const bool few = mayBeWide(h, node, records, v, instance.scale * f.supportScale);
+        // A level of an overview is beside none of the root's own records, nor of another level: all of it has one
+        // error.
+        const auto codeOf = [&](size_t i) { return shared::recordErrorCode(records[i]); };
+        size_t overview = 0;
+        while (cut.chunk == 0 && overview < records.size() && codeOf(overview) > node.errorCode) ++overview;
+        const bool isOverview = cut.first < overview;
+        size_t end = isOverview ? cut.first : records.size();
+        while (isOverview && end < overview && codeOf(end) == codeOf(cut.first)) ++end;
+        const size_t begin = isOverview ? cut.first : overview;
+        const auto alike = std::span(records).subspan(begin, end - begin);
+        const bool few = mayBeWide(h, node, alike, v, instance.scale * f.supportScale);
         const double step = h.cellSize(node) / 65536;
         // What the store tells is in eighths of octaves; what it does not tell is measured.
         const uint8_t code = h.payload(cut.chunk).spacingCode;
         const double steps =
             code > 0 ? std::exp2((code - 1) / 8.0) : double{lod::recordSpacing(lod::withoutEmpty(records))};
-        const double spacing = h.isStochastic ? 0 : instance.scale * h.unit * step * steps;
+        const double spacing = h.isStochastic || isOverview ? 0 : instance.scale * h.unit * step * steps;
         const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
         const bool isSmooth =
-            !isDebug && spacing > 0 && areFacets(draws, cut, draws.bends.empty() ? nullptr : &draws.bends[d], records);
-        for (uint32_t i = 0; i < cut.count; ++i) {
+            !isDebug && spacing > 0 && areFacets(draws, cut, draws.bends.empty() ? nullptr : &draws.bends[d], alike);
+        for (uint32_t i = cut.first; i < cut.first + cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);
             disc.radius *= cut.radiusScale;
             if (disc.errorCode > cut.errorCode && !(cut.octantMask >> disc.octant & 1u)) continue;

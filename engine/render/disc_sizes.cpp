@@ -38,11 +38,9 @@ LatticeBox boxOf(std::span<const shared::PointRecord> records) {
 
 }  // namespace
 
-Result<void> DiscSizes::upload(streaming::ChunkKey key, lod::Chunk chunk) {
-    if (life_.expired()) return fail(ErrorKind::device, "what draws the scene is gone");
+DiscSizes::Size DiscSizes::measured(std::span<const shared::PointRecord> records) {
     uint32_t code = 0;
     uint64_t sum = 0;
-    const auto records = lod::withoutEmpty(chunk.records);
     for (const shared::PointRecord& r : records) {
         code = std::max(code, shared::recordRadiusCode(r) + 1);
         sum += shared::recordRadiusCode(r);
@@ -50,17 +48,35 @@ Result<void> DiscSizes::upload(streaming::ChunkKey key, lod::Chunk chunk) {
     const uint64_t usual = records.empty() ? 0 : (2 * sum + records.size()) / (2 * records.size());
     const auto points = static_cast<float>(records.size());
     const bool isDense = code > 0 && shared::radiusFraction(code - 1) * std::sqrt(points) > kMostSpacings;
+    const LatticeBox box = boxOf(records);
+    return {static_cast<uint8_t>(std::min(code, 255u)), static_cast<uint8_t>(usual), isDense, 0, box.low, box.high};
+}
+
+void DiscSizes::measureOverview(uint32_t source, std::span<const shared::PointRecord> records) {
+    if (overviews_.size() <= source) overviews_.resize(source + 1);
+    std::vector<OfLevel>& levels = overviews_[source];
+    levels.clear();
+    for (size_t begin = 0, end = 0; begin < records.size(); begin = end) {
+        const uint32_t code = shared::recordErrorCode(records[begin]);
+        while (end < records.size() && shared::recordErrorCode(records[end]) == code) ++end;
+        levels.push_back({static_cast<uint32_t>(end), measured(records.subspan(begin, end - begin))});
+    }
+}
+
+Result<void> DiscSizes::upload(streaming::ChunkKey key, lod::Chunk chunk) {
+    if (life_.expired()) return fail(ErrorKind::device, "what draws the scene is gone");
+    auto records = lod::withoutEmpty(chunk.records);
+    const lod::Hierarchy* const h = key.source < hierarchies_.size() ? hierarchies_[key.source] : nullptr;
+    if (h != nullptr && key.chunk == 0 && !records.empty()) {
+        const auto overview = std::min<size_t>(h->overviewOf(h->nodes[0]), records.size());
+        measureOverview(key.source, records.first(overview));
+        records = records.subspan(overview);
+    }
     if (sizes_.size() <= key.source) sizes_.resize(key.source + 1);
     auto& of = sizes_[key.source];
     if (of.size() <= key.chunk) of.resize(key.chunk + 1);
-    const bool isTold = key.source < hierarchies_.size() && isSpacingTold(*hierarchies_[key.source], key.chunk);
-    const LatticeBox box = boxOf(records);
-    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)),
-                     static_cast<uint8_t>(usual),
-                     isDense,
-                     isTold ? 0 : lod::recordSpacing(records),
-                     box.low,
-                     box.high};
+    of[key.chunk] = measured(records);
+    if (h == nullptr || !isSpacingTold(*h, key.chunk)) of[key.chunk].spacing = lod::recordSpacing(records);
     return backend_.upload(keyOfBackend(key), std::move(chunk));
 }
 
@@ -81,8 +97,14 @@ DiscSizes::Size DiscSizes::sizeOf(streaming::ChunkKey key) const {
 
 float DiscSizes::spacingOf(streaming::ChunkKey key) const { return sizeOf(key).spacing; }
 
-DiscSizes::Share DiscSizes::shareOf(streaming::ChunkKey key) const {
-    const Size size = sizeOf(key);
+DiscSizes::Share DiscSizes::shareOf(streaming::ChunkKey key, uint32_t end) const {
+    const uint32_t source = key.source - first_;
+    Size size = sizeOf(key);
+    if (key.chunk == 0 && source < overviews_.size()) {
+        const auto& levels = overviews_[source];
+        const auto of = std::find_if(levels.begin(), levels.end(), [&](const OfLevel& l) { return end <= l.end; });
+        if (of != levels.end()) size = of->size;
+    }
     return {size.code == 0     ? 0
             : size.code == 255 ? 1
                                : shared::radiusFraction(size.code - 1u),
@@ -102,7 +124,7 @@ void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
         if (d.spacing < 0) d.spacing *= -sizes.spacingOf(points.keys[i]);
         const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
         const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
-        const DiscSizes::Share share = sizes.shareOf(points.keys[i]);
+        const DiscSizes::Share share = sizes.shareOf(points.keys[i], d.count);
         draws.pointBounds.push_back({share.low, share.high, d.edge * share.ofEdge});
         // Leaves and the like, which are no surface, have no spacing.
         const double usual = double{d.edge} * double{f.supportScale * share.usual} * double{f.focal};

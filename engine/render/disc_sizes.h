@@ -40,8 +40,9 @@ class DiscSizes final : public streaming::ChunkSink {
         float usual = 0;       ///< that of a usual one, likewise
         std::array<uint16_t, 3> low{0, 0, 0}, high{65535, 65535, 65535};  ///< steps between which the records lie
     };
-    /// `key`: as the backend has it.
-    Share shareOf(streaming::ChunkKey key) const;
+    /// `key`: as the backend has it; `end`: where the records that are drawn end in the chunk, which tells levels of an
+    /// overview (Hierarchy::overviewOf) from what a node holds itself.
+    Share shareOf(streaming::ChunkKey key, uint32_t end) const;
     /// Of stores that do not tell it: steps of the node's lattice; 0: not known.
     float spacingOf(streaming::ChunkKey key) const;
 
@@ -53,6 +54,13 @@ class DiscSizes final : public streaming::ChunkSink {
         float spacing = 0;
         std::array<uint16_t, 3> low{0, 0, 0}, high{65535, 65535, 65535};
     };
+    /// Of a level of an overview.
+    struct OfLevel {
+        uint32_t end = 0;  ///< of its records in the chunk
+        Size size;
+    };
+    void measureOverview(uint32_t source, std::span<const shared::PointRecord> records);
+    static Size measured(std::span<const shared::PointRecord> records);
     Size sizeOf(streaming::ChunkKey key) const;
     streaming::ChunkKey keyOfBackend(streaming::ChunkKey key) const;
 
@@ -60,6 +68,7 @@ class DiscSizes final : public streaming::ChunkSink {
     std::weak_ptr<const void> life_;  ///< of the backend: what is gone needs nothing back
     uint32_t first_ = 0;
     std::vector<std::vector<Size>> sizes_;            ///< by source and node
+    std::vector<std::vector<OfLevel>> overviews_;     ///< by source
     std::vector<const lod::Hierarchy*> hierarchies_;  ///< by source
 };
 

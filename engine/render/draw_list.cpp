@@ -132,12 +132,12 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const lod::Payload& payl
     d.errorCode = draw.errorCode;
     d.octantMask = draw.octantMask | (bend.isStill() ? 0u : shared::kNodeBent | shared::kNodeTurned) |
                    (instance.rotation != glm::dmat3(1) ? shared::kNodeTurned : 0u);
-    d.count = draw.count;
+    d.count = draw.first + draw.count;
     d.level = node.level;
     // Discs among which any beginning shows the whole have none. Of stores that do not tell it: minus a step, which
     // markDiscSizes takes times what was measured.
     const float steps = payload.spacingCode == 0 ? -1.0f : lod::spacingOfCode(payload.spacingCode);
-    const bool isSpaced = payload.kind == lod::Kind::points && !h.isStochastic;
+    const bool isSpaced = payload.kind == lod::Kind::points && !h.isStochastic && draw.first >= h.overviewOf(payload);
     d.spacing = isSpaced ? steps * static_cast<float>(worldPerStep) : 0.0f;
     d.weights = lod::weightsOf(h, draw.chunk) != nullptr ? payload.records : 0u;
     d.errorPixels = draw.errorPixels;
@@ -192,7 +192,7 @@ void addNodes(const glm::dmat3& cameraFromWorld, const DrawSettings& settings, E
         if (kind != lod::kindOf(h, draw.chunk)) drawsSamples(draw);
         DrawBatch& batch = out.of(kind);
         const auto index = static_cast<uint32_t>(batch.nodes.size());
-        for (uint32_t first = 0; first < draw.count; first += drawnKind(kind).recordsPerBlock)
+        for (uint32_t first = draw.first; first < draw.first + draw.count; first += drawnKind(kind).recordsPerBlock)
             batch.blocks.push_back({index, first});
         batch.nodes.push_back(makeDrawNode(draw, payload, bend, cameraFromWorld, out));
         const shared::DrawNode& node = batch.nodes.back();
@@ -200,6 +200,7 @@ void addNodes(const glm::dmat3& cameraFromWorld, const DrawSettings& settings, E
         if (hasMaterial && settings.lit && kind == lod::Kind::points) out.frame.hasMaterials = 1;
         batch.keys.push_back({out.firstSource + instance.source, draw.chunk});
         batch.instances.push_back(draw.instance);
+        batch.records.push_back(draw.count);
     }
     if (out.swaying == 0) out.bends.clear();
 }

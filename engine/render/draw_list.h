@@ -53,12 +53,14 @@ struct DrawBatch {
     std::vector<shared::DrawBlock> blocks;  ///< of triangles one a cluster: its run and place in the chunk
     std::vector<streaming::ChunkKey> keys;  ///< chunk of each node (run)
     std::vector<uint32_t> instances;        ///< of each node
+    std::vector<uint32_t> records;          ///< of each node of records: how many are looked at
     bool isEmpty() const { return blocks.empty(); }
     void clear() {
         nodes.clear();
         blocks.clear();
         keys.clear();
         instances.clear();
+        records.clear();
     }
 };
 

@@ -73,8 +73,9 @@ double thicknessOf(const DrawList& draws, const DiscSizes& sizes) {
     const DrawBatch& points = draws.points();
     for (size_t i = 0; i < points.nodes.size(); ++i) {
         const shared::DrawNode& node = points.nodes[i];
-        sum += static_cast<double>(node.count) * double{sizes.shareOf(points.keys[i]).usual * node.edge};
-        count += node.count;
+        const double records = points.records[i];
+        sum += records * double{sizes.shareOf(points.keys[i], node.count).usual * node.edge};
+        count += records;
     }
     return count > 0 ? kShare * sum / count : 0;
 }

@@ -41,11 +41,15 @@ void addErrors(std::span<const lod::Hierarchy* const> hierarchies, std::span<con
             continue;
         }
         const lod::Node& node = h.nodes[points.keys[n].chunk];
-        if (std::max<uint32_t>(node.errorCode, node.sourceCode) >= lod::ErrorScale::kLargest) {
+        const shared::DrawNode& drawn = points.nodes[n];
+        // Levels of an overview have larger errors than the root's own records, and no larger ones than are allowed.
+        const uint32_t overview = drawn.count <= h.overviewOf(node) ? drawn.errorCode : 0u;
+        const uint32_t code = std::max({uint32_t{node.errorCode}, uint32_t{node.sourceCode}, overview});
+        if (code >= lod::ErrorScale::kLargest) {
             error = std::numeric_limits<float>::infinity();  // the last code stands for whatever is larger
             continue;
         }
-        const double own = std::max(h.errors.decode(node.errorCode), h.errors.decode(node.sourceCode));
+        const double own = h.errors.decode(code);
         error = static_cast<float>(1.001 * (own * h.unit * instance.scale + instance.inputError + instance.sway));
     }
 }
@@ -68,10 +72,10 @@ void Unrefined::take(const Backend& backend, const DrawList& draws) {
     if (!isKnown_) return;
     const DrawBatch& points = draws.points();
     uint64_t all = 0, more = 0;
-    for (const shared::DrawNode& node : points.nodes) all += node.count;
+    for (const uint32_t records : points.records) all += records;
     for (const uint32_t n : *hidden) {
         hidden_.push_back({points.instances[n], points.keys[n].chunk});
-        more += has(nodes_, hidden_.back()) ? 0 : points.nodes[n].count;
+        more += has(nodes_, hidden_.back()) ? 0 : points.records[n];
     }
     std::sort(hidden_.begin(), hidden_.end());
     newShare_ = all == 0 ? 0 : static_cast<double>(more) / static_cast<double>(all);

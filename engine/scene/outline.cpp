@@ -30,7 +30,7 @@ const std::array<glm::dvec3, kDirections>& directions() {
 std::vector<uint32_t> coarseNodes(const lod::Hierarchy& h) {
     std::vector<uint32_t> front;
     front.push_back(0);
-    for (size_t records = h.nodes[0].records; records < kEnoughRecords;) {
+    for (size_t records = h.ownRecordsOf(h.nodes[0]); records < kEnoughRecords;) {
         std::vector<uint32_t> next;
         records = 0;
         for (const uint32_t n : front) {

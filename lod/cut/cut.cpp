@@ -83,8 +83,8 @@ Choice chooseFor(const CutFrame& frame, uint32_t i, int step) {
         return proxy.records < own.records ? Choice{best, proxy, true} : Choice{i, own, true};
     }
     const CutCost proxy = costOf(frame, best, step, kNoLimit);
-    // Its root alone has more: no need to look further.
-    if (proxy.records <= h.nodes[0].records) return {best, proxy, true};
+    // Its root alone has more: no need to look further. (But an overview may have fewer.)
+    if (h.overviewOf(h.nodes[0]) == 0 && proxy.records <= h.nodes[0].records) return {best, proxy, true};
     const CutCost own = costOf(frame, i, step, proxy.records);
     return proxy.records <= own.records ? Choice{best, proxy, true} : Choice{i, own, true};
 }

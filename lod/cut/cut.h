@@ -6,6 +6,9 @@
 // N's parent (a prefix of the records) and its own is small enough for N, or its octant's child cannot be drawn. Nested
 // spheres make eps grow towards the leaves and errors shrink, so every leaf is covered exactly once.
 //
+// Small features: the root's records give way, too, to the levels of its overview (Hierarchy::overviewOf), so that what
+// is small in the picture costs no more than the few records that stand for it within tau.
+//
 // All comparisons are between integer codes (eps is rounded down to the error scale), which makes the cut of equal
 // views equal to the last record.
 #pragma once
@@ -94,7 +97,8 @@ struct Budgets {
 struct CutDraw {
     uint32_t instance = 0, node = 0;
     uint32_t chunk = 0;       ///< that holds the records
-    uint32_t count = 0;       ///< first records of the chunk
+    uint32_t first = 0;       ///< record of the chunk
+    uint32_t count = 0;       ///< records from there
     uint32_t errorCode = 0;   ///< draw records with own error <= this ...
     uint32_t octantMask = 0;  ///< ... and all records of these octants
     float errorPixels = 0;    ///< largest screen-space error among what this node draws
@@ -129,7 +133,7 @@ struct Cut {
     std::vector<std::pair<uint32_t, uint32_t>> keep;  ///< (source, chunk) that must not be evicted
     double tauTarget = 0;                             ///< error, px, that the budget allows once everything is resident
     double tauEffective = 0;                          ///< error, px, delivered by what is drawn now
-    bool truncated = false;  ///< even the roots exceed the record budget: some of their records are left out
+    bool truncated = false;  ///< even the coarsest of all roots exceed the budget: some of their records are left out
     CutCounters counters;
 };
 

@@ -21,6 +21,7 @@ struct CutFrame {
     const Residency& residency;
     const View& view;
     CutScratch& scratch;
+    bool hasNoOverviews = false;  ///< roots are drawn as what they hold themselves at least
 
     const Instance& instance(uint32_t i) const { return scene.instances[i]; }
     const Hierarchy& hierarchyOf(uint32_t i) const { return *scene.hierarchies[instance(i).hierarchy]; }
@@ -77,13 +78,17 @@ inline double pixelsOf(const CutScratch::Slot& slot, uint32_t code, int32_t epsi
     return epsilon == kInside ? 1e6 : error * std::exp2(-static_cast<double>(epsilon) / kStepsPerOctave);
 }
 
-/// Of a payload of records: the first ones that are looked at, and those among them that are left to the children.
+/// Of a payload of records: where those that are looked at begin and end (before are levels of the overview that are
+/// too coarse), and how many of them are left to the children.
 struct Prefix {
-    uint32_t count, tooCoarse;
+    uint32_t first, end, tooCoarse;
+    uint32_t drawn() const { return end - first - tooCoarse; }
 };
 inline Prefix prefixOf(const Hierarchy& h, const Payload& p, const Asked& asked) {
-    return {h.countGreater(p.parentCounts, p.records, asked.parentCode),
-            asked.octantMask != 0 ? 0 : h.countGreater(p.ownCounts, p.records, asked.code)};
+    const uint32_t coarse = h.countGreater(p.ownCounts, p.records, asked.code),
+                   first = asked.code < p.errorCode ? h.overviewOf(p) : coarse,
+                   end = std::max(first, h.countGreater(p.parentCounts, p.records, asked.parentCode));
+    return {first, end, asked.octantMask != 0 ? 0 : coarse - first};
 }
 
 // ---- the cut of one view, in the parts that cuts of several views are made of
@@ -144,6 +149,13 @@ PlannedStep planStep(const Cost& cost, int target, uint64_t budget, CutCounters&
 void planResident(const CutScene& scene, uint64_t residentBytes, std::span<const std::pair<uint32_t, uint32_t>> barred,
                   const std::function<const Cut&(const Residency&)>& cutOf, ResidentPlan& plan);
 
+/// Error code of the level of the overview that is drawn where `code` is allowed.
+inline uint32_t errorOfOverview(const Hierarchy& h, const Payload& p, uint32_t code) {
+    const uint32_t coarser = h.countGreater(p.ownCounts, p.records, code);
+    while (code > p.errorCode && h.countGreater(p.ownCounts, p.records, code - 1) == coarser) --code;
+    return code;
+}
+
 /// Error, px, of what is drawn of a payload whose largest own error is `errorCode`.
 inline double deliveredPixels(const CutScratch::Slot& slot, uint32_t errorCode, const Asked& asked) {
     const uint32_t drawn = asked.octantMask ? errorCode : std::min(errorCode, asked.code);
@@ -163,15 +175,18 @@ inline void tellLeafError(const Node& node, int32_t epsilon, Cut& cut) {
 /// emitRecords, of a payload whose node and frame are at hand.
 inline void appendRecords(const CutScratch::Slot& slot, const Hierarchy& h, uint32_t instance, uint32_t node,
                           uint32_t chunk, const Payload& p, const Asked& asked, Cut& cut) {
-    const auto [count, tooCoarse] = prefixOf(h, p, asked);
+    const Prefix prefix = prefixOf(h, p, asked);
+    const uint32_t count = prefix.end - prefix.first;
     if (count == 0) return;
-    cut.counters.recordsDrawn += count - tooCoarse;
+    cut.counters.recordsDrawn += prefix.drawn();
     cut.counters.recordsTested += count;
-    const double delivered = deliveredPixels(slot, p.errorCode, asked);
+    const uint32_t error = prefix.first < h.overviewOf(p) ? errorOfOverview(h, p, asked.code) : p.errorCode;
+    const double delivered = deliveredPixels(slot, error, asked);
     if (asked.octantMask) cut.tauEffective = std::max(cut.tauEffective, delivered);
     tellLeafError(h.nodes[node], asked.epsilon, cut);
-    if (count > tooCoarse)
-        cut.draw.push_back({instance, node, chunk, count, asked.code, asked.octantMask, static_cast<float>(delivered)});
+    if (prefix.drawn() > 0)
+        cut.draw.push_back(
+            {instance, node, chunk, prefix.first, count, asked.code, asked.octantMask, static_cast<float>(delivered)});
 }
 
 /// Entries of kinds.h: what cuts of octrees have of payloads ...

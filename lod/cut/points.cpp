@@ -5,8 +5,7 @@
 namespace stipple::lod {
 
 uint64_t costOfRecords(const Hierarchy& h, uint32_t chunk, const Asked& asked) {
-    const Prefix prefix = prefixOf(h, h.payload(chunk), asked);
-    return prefix.count - prefix.tooCoarse;
+    return prefixOf(h, h.payload(chunk), asked).drawn();
 }
 
 void emitRecords(const CutFrame& frame, uint32_t i, uint32_t chunk, const Asked& asked, Cut& cut) {

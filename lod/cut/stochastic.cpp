@@ -126,7 +126,7 @@ void emitStochastic(const CutFrame& frame, uint32_t i, int step, ActiveMembers& 
         const double larger = std::sqrt(static_cast<double>(h.nodes[index].records) / count);
         const double radius = std::exp2(h.nodes[index].errorCode / 8.0) * h.errors.smallest;
         const auto scale = static_cast<float>(larger) * h.discFactor(radius * larger);
-        cut.draw.push_back({i, index, index, count, ErrorScale::kNoParent, 0, static_cast<float>(pixels), scale});
+        cut.draw.push_back({i, index, index, 0, count, ErrorScale::kNoParent, 0, static_cast<float>(pixels), scale});
         cut.counters.recordsDrawn += count;
         cut.counters.recordsTested += count;
         // Of a node that is drawn whole and too coarse all the same.

@@ -34,10 +34,7 @@ struct OneOfRecords {
     void forEach(uint32_t node, const Use& use) const {
         use(node);
     }
-    uint64_t cost(uint32_t node, const Asked& asked) const {
-        const Prefix prefix = prefixOf(h, h.nodes[node], asked);
-        return prefix.count - prefix.tooCoarse;
-    }
+    uint64_t cost(uint32_t node, const Asked& asked) const { return prefixOf(h, h.nodes[node], asked).drawn(); }
     void emit(const CutFrame&, const CutScratch::Slot& slot, uint32_t i, uint32_t node, const Asked& asked,
               Cut& cut) const {
         appendRecords(slot, h, i, node, node, h.nodes[node], asked, cut);
@@ -74,6 +71,17 @@ struct OnTheWay {
     uint32_t code, parentCode;
 };
 
+/// Of a node that is not refined: all that its records may be. A root is drawn as what it holds itself, for where it is
+/// hidden what that hides is known, or as coarser as it may be anyway.
+template <typename Payloads>
+uint32_t codeOfUnrefined(const Payloads& of, const CutScratch::Slot& slot, const Hierarchy& h, uint32_t node,
+                         int step) {
+    if (node != 0) return ErrorScale::kLargest;
+    const int32_t epsilon = allowedError(h, h.nodes[0], slot.view, slot.sway);
+    const uint32_t allowed = epsilon == kCulled ? 0 : std::min(codeOf(slot, epsilon, step), largestAllowed(h));
+    return std::max(of.errorCode(0), allowed);
+}
+
 /// Calls use(at) for every node in view that any record may be drawn of, parents first; it says whether to go on.
 /// onCulled(): of one out of view. `isReached(node)`: may its children be looked at?
 template <typename Payloads, typename OnCulled, typename IsReached, typename Use>
@@ -94,10 +102,11 @@ void walkTree(const Payloads& of, const CutFrame& frame, uint32_t i, int step, c
             onCulled();
             continue;
         }
-        const uint32_t parentCode =
-            index == 0 ? ErrorScale::kLargest : std::min(codeOf(slot, parentEpsilon, step), largest);
-        const uint32_t code =
-            epsilon == kAnyError ? ErrorScale::kLargest : std::min(codeOf(slot, epsilon, step), largest);
+        // (What is above the root's own records is its overview, in the same payload.)
+        uint32_t code = epsilon == kAnyError ? codeOfUnrefined(of, slot, h, index, step)
+                                             : std::min(codeOf(slot, epsilon, step), largest);
+        if (index == 0 && frame.hasNoOverviews) code = std::min(code, of.errorCode(0));
+        const uint32_t parentCode = index == 0 ? code : std::min(codeOf(slot, parentEpsilon, step), largest);
         if (!use(OnTheWay{index, epsilon, parentEpsilon, code, parentCode})) return;
         if (of.errorCode(index) <= code || !isReached(index) || !h.hasChildrenOf(node)) continue;
         const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));

@@ -36,6 +36,17 @@ struct Rank {
     }
 };
 
+/// Records that are set aside for secondary views: of the overviews of all roots, which is the least that there is, or
+/// better of the roots' own records, as long as those are a quarter of the budget at most.
+uint64_t leastOf(const Rank& secondary, uint64_t budget) {
+    constexpr uint64_t kShare = 4;
+    const uint64_t overviews = secondary.cost(kLargestTauStep, budget, Counted::all).records;
+    Rank roots = secondary;
+    for (CutFrame& frame : roots.frames) frame.hasNoOverviews = true;
+    const uint64_t own = roots.cost(kLargestTauStep, budget / kShare, Counted::all).records;
+    return std::max(overviews, std::min(own, budget / kShare));
+}
+
 /// What several cuts miss and need, each chunk once.
 void merge(std::span<const ViewRequest> views, CutOfViews& out) {
     Cut& merged = out.merged;
@@ -78,7 +89,7 @@ void selectCuts(const CutScene& scene, const Residency& residency, std::span<con
     // What secondary views cannot do without is set aside; what primary ones leave is theirs.
     CutCounters evaluations;
     const bool isLimited = records != kNoLimit;
-    const uint64_t least = isLimited ? ranks[1].cost(kLargestTauStep, records, Counted::all).records : 0;
+    const uint64_t least = isLimited ? leastOf(ranks[1], records) : 0;
     std::array<PlannedStep, 2> steps{};
     steps[0] = ranks[0].plan(isLimited ? records - std::min(least, records) : records, evaluations);
     uint64_t left = records;

@@ -40,10 +40,10 @@ struct KindTraits {
     uint64_t (*decodedBytes)(const Hierarchy& h, uint32_t chunk);
     /// Is a payload of an octree possible, beside what all have in common? Nothing was read but the tables.
     bool (*isPossible)(const Hierarchy& h, uint32_t chunk);
-    /// Is a chunk what the tables say of it? Empty, or what is wrong.
+    /// Is a chunk, as it is drawn (readDrawnChunk), what the tables say of it? Empty, or what is wrong.
     std::string (*check)(const Hierarchy& h, uint32_t index, const Chunk& chunk);
     /// Are the errors of a chunk's records (`discs`: of so many of them) no larger than stated? How many were measured.
-    /// Of stores that have no other kind.
+    /// Of stores that have no other kind; of a chunk as it is drawn.
     Result<uint64_t> (*measure)(const Store& store, uint32_t index, const Chunk& chunk, uint64_t discs);
     /// Those of its records that nothing finer replaces.
     uint64_t (*leafRecords)(const Hierarchy& h, uint32_t chunk);

@@ -63,7 +63,7 @@ struct Payload {
     uint32_t group = 0;                     ///< of triangles: into Hierarchy::groups
     Kind kind = Kind::points;
     Codec codec = Codec::points;
-    uint8_t errorCode = 0;    ///< largest own error among the records
+    uint8_t errorCode = 0;    ///< largest own error among the records (but those of an overview)
     int8_t stepShift = 0;     ///< position step of the records: 2^stepShift lattice units
     uint8_t spacingCode = 0;  ///< of points: how far records lie apart (record_spacing.h); 0: not known
     uint8_t maps = 0;         ///< of patches: what their maps are at most (patch_map.h); 0: there are none

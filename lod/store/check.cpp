@@ -209,6 +209,18 @@ struct Before {
     uint64_t children = 1, runs = 0;
 };
 
+/// Only roots of points alone have one, and something below it. (What reads leaves relies on that.)
+bool hasPossibleOverview(const Hierarchy& h, uint32_t node) {
+    bool fits = true;
+    h.forEachPayload(node, [&](uint32_t chunk) {
+        const Payload& p = h.payload(chunk);
+        if (p.kind != Kind::points || h.isStochastic) return;
+        const uint32_t overview = h.overviewOf(p);
+        fits = fits && (overview == 0 || (chunk == 0 && !h.isMixed && overview < p.records));
+    });
+    return fits;
+}
+
 /// Of a tree, breadth first, nodes `begin` to `end`: the children of a node follow those of the node before it, so that
 /// no node is the child of two, and so do the runs of its triangles. `before` moves on. What is above them was checked.
 Result<void> checkTree(const Hierarchy& h, const std::string& path, uint64_t begin, uint64_t end, uint64_t chunksEnd,
@@ -216,8 +228,8 @@ Result<void> checkTree(const Hierarchy& h, const std::string& path, uint64_t beg
     for (uint64_t i = begin; i < end; ++i) {
         const auto number = static_cast<uint32_t>(i);
         const Node& n = h.nodes[i];
-        bool fits = isPossibleNode(h, number, chunksEnd) && (n.isLeaf() || n.firstChild == before.children) &&
-                    (i == 0 || isPossibleChild(h, number, begin));
+        bool fits = isPossibleNode(h, number, chunksEnd) && hasPossibleOverview(h, number) &&
+                    (n.isLeaf() || n.firstChild == before.children) && (i == 0 || isPossibleChild(h, number, begin));
         h.forEachPayload(number, [&](uint32_t chunk) {
             const Payload& p = h.payload(chunk);
             if (p.kind != Kind::triangles) return;

@@ -195,6 +195,12 @@ struct Hierarchy {
         if (code < c.lo) return records;
         return code >= c.hi ? 0u : greaterThan[c.first + (code - c.lo)];
     }
+    /// Records of the OVERVIEW, which come first: levels of ever fewer records for all that a store of points holds, in
+    /// the chunk of its root (lod/builder/points/overview.h). Their own codes are larger than the payload's errorCode,
+    /// which is that of the others.
+    uint32_t overviewOf(const Payload& p) const { return countGreater(p.ownCounts, p.records, p.errorCode); }
+    /// Those that the node holds itself.
+    uint32_t ownRecordsOf(const Payload& p) const { return p.records - overviewOf(p); }
     double cellSize(const Node& n) const { return std::exp2(static_cast<double>(rootLog2) - n.level); }
     /// Lattice position that record coordinate (0,0,0) stands for: the centre of the lattice steps that the
     /// first position step holds.

@@ -10,6 +10,9 @@
 // stands before it. So a first image needs the head, the directory, the first page, and those that it looks at. The
 // section of the mesh holds a MeshHead and then textures and tiles.
 //
+// Version 12: the records of the root begin with an overview (Hierarchy::overviewOf), and the parents' codes of its own
+// ones are those of the overview's finest level.
+//
 // Versions 8 and 9 have one section for all nodes, one for counts per code, one for payloads (a PayloadHead and then
 // its arrays), and that of the mesh holds the groups, too.
 //

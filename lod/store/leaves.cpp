@@ -82,8 +82,8 @@ Result<PointSource> leafPoints(std::shared_ptr<const Store> store) {
     for (uint32_t n = 0; n < h.nodes.size(); ++n)
         if (h.nodes[n].isLeaf()) {
             leaves.push_back(n);
-            source.parts.push_back(h.nodes[n].records);
-            source.info.points += h.nodes[n].records;
+            source.parts.push_back(h.ownRecordsOf(h.nodes[n]));
+            source.info.points += source.parts.back();
         }
     source.openPart = [store, leaves](size_t part) -> Result<PointReader> {
         auto leaf = std::make_shared<Leaf>();

@@ -79,6 +79,7 @@ bool hasLight(const Hierarchy& h) {
     const auto has = [](const Payload& p) { return p.kind == Kind::patches && (p.maps & shared::kMapLight) != 0; };
     return std::any_of(h.nodes.begin(), h.nodes.end(), has) || std::any_of(h.further.begin(), h.further.end(), has);
 }
+bool hasOverview(const Hierarchy& h) { return !h.nodes.empty() && h.overviewOf(h.nodes[0]) > 0; }
 }  // namespace
 
 Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& description, uint32_t log2PageNodes) {
@@ -95,7 +96,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
     STIPPLE_ASSIGN(head.description, write(text));
     STIPPLE_ASSIGN(head.mesh, write(meshBytes(h)));
     head.magic = kMagic;
-    head.version = hasLight(h) ? kLightVersion : kStoreVersion;
+    head.version = hasOverview(h) ? kOverviewVersion : hasLight(h) ? kLightVersion : kStoreVersion;
     moveHead(h, head, kToDisk);
     head.nodeCount = h.nodes.size();
     head.fileBytes = file_.position() + sizeof(Foot);
@@ -117,7 +118,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
 
 namespace {
 
-bool hasPages(const Head& head) { return head.version == kStoreVersion || head.version == kLightVersion; }
+bool hasPages(const Head& head) { return head.version >= kStoreVersion && head.version <= kOverviewVersion; }
 bool hasPayloadsInNodes(const Head& head) { return head.version == kOldVersion || head.version == kOldWideMeshVersion; }
 
 /// The head, with its hash and the foot's checked; of old versions what they do not have is empty.
@@ -134,7 +135,7 @@ Result<Head> readHead(const ByteSource& file) {
     const bool isOld = hasPayloadsInNodes(head);
     if (!hasPages(head) && head.version != kUnpagedVersion && head.version != kVersionBefore && !isOld)
         return fail(ErrorKind::input,
-                    fmt::format("has store version {}; this program reads version {}", head.version, kLightVersion),
+                    fmt::format("has store version {}; this program reads version {}", head.version, kOverviewVersion),
                     path, "build it again with this program");
     const auto damaged = [&](const std::string& what) { return tl::unexpected(damagedStore(path, what)); };
     if (isOld) {  // the hash stands where others have more
@@ -315,7 +316,7 @@ Result<void> readWholeTable(const Store& store) {
     return {};
 }
 
-Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
+Result<Chunk> readDrawnChunk(const Store& store, uint32_t index, bool wantLowBits) {
     if (const Hierarchy& h = store.hierarchy; h.isUnknown(index))
         STIPPLE_TRY(store.pages->load(h, h.known.pageOf(index)));
     const ChunkPlace place = chunkPlace(store.hierarchy, index);
@@ -327,6 +328,16 @@ Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
         return tl::unexpected(damagedStore(where, "the hash does not match"));
     STIPPLE_ASSIGN(Chunk chunk, decodeStored(store.hierarchy, index, bytes.data(), bytes.size(), where, wantLowBits));
     STIPPLE_TRY(checkMaterials(store, chunk, where));
+    return chunk;
+}
+
+Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
+    STIPPLE_ASSIGN(Chunk chunk, readDrawnChunk(store, index, wantLowBits));
+    const Hierarchy& h = store.hierarchy;
+    if (index != 0 || chunk.records.empty()) return chunk;
+    const auto overview = static_cast<ptrdiff_t>(h.overviewOf(h.nodes[0]));
+    chunk.records.erase(chunk.records.begin(), chunk.records.begin() + overview);
+    if (!chunk.lowBits.empty()) chunk.lowBits.erase(chunk.lowBits.begin(), chunk.lowBits.begin() + 3 * overview);
     return chunk;
 }
 
@@ -373,7 +384,13 @@ Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t index, s
     const std::string where = fmt::format("{}: attributes of chunk {} at offset {}", store.path, index, offset);
     if (hashBytes(bytes.data(), bytes.size()) != p.attributeHash)
         return tl::unexpected(damagedStore(where, "the hash does not match"));
-    return decodeAttribute(bytes.data(), bytes.size(), store.description.attributes, attribute, p.records, where);
+    const std::vector<AttributeInfo>& infos = store.description.attributes;
+    STIPPLE_ASSIGN(std::vector<uint8_t> values,
+                   decodeAttribute(bytes.data(), bytes.size(), infos, attribute, p.records, where));
+    if (index != 0 || p.kind != Kind::points) return values;
+    const size_t overview = store.hierarchy.overviewOf(p) * bytesOf(infos[attribute].type);
+    values.erase(values.begin(), values.begin() + static_cast<ptrdiff_t>(overview));
+    return values;
 }
 
 }  // namespace stipple::lod

@@ -20,6 +20,8 @@ namespace stipple::lod {
 inline constexpr uint32_t kStoreVersion = 10;
 /// The same with light of their own in maps of patches, which programs before that do not know.
 inline constexpr uint32_t kLightVersion = 11;
+/// With an overview (Hierarchy::overviewOf) before the records of the root, which they would draw on top of these.
+inline constexpr uint32_t kOverviewVersion = 12;
 /// Still read: with one payload a node; such meshes whose coordinates have more than 30 bits; without spacings of
 /// records (or with them, and taken for damaged by programs of then); without pages of nodes.
 inline constexpr uint32_t kOldVersion = 6, kOldWideMeshVersion = 7, kVersionBefore = 8, kUnpagedVersion = 9;
@@ -85,14 +87,16 @@ ChunkPlace chunkPlace(const Hierarchy& h, uint32_t index);
 /// Decodes a chunk, whatever it holds.
 Result<Chunk> decodeStored(const Hierarchy& h, uint32_t chunk, const uint8_t* bytes, size_t count,
                            const std::string& where, bool wantLowBits);
-/// Reads one chunk, checks its hash, decodes it.
+/// Reads one chunk, checks its hash, decodes it: what the node holds itself.
 Result<Chunk> readChunk(const Store& store, uint32_t chunk, bool wantLowBits = false);
+/// The same with an overview before that (Hierarchy::overviewOf), as it is drawn.
+Result<Chunk> readDrawnChunk(const Store& store, uint32_t chunk, bool wantLowBits = false);
 
 /// The stream of that id, if the payload has one.
 std::optional<Stream> findStream(const Hierarchy& h, uint32_t chunk, StreamId id);
 /// Its bytes, as they are in the file; their hash is checked.
 Result<std::vector<uint8_t>> readStream(const Store& store, uint32_t chunk, const Stream& stream);
-/// Checks the hash of a chunk's attribute streams and decodes the one of attribute `index`.
+/// Checks the hash of a chunk's attribute streams and decodes the one of attribute `index`, of what readChunk reads.
 Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t chunk, size_t index);
 
 struct VerifyReport {

@@ -30,10 +30,12 @@ bool isAboveLeaves(const Hierarchy& h, const Node& node) {
     return !node.isLeaf();
 }
 
-void addDiscs(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize, std::vector<Disc>& discs) {
+/// Of records [first, end).
+void addDiscs(const Hierarchy& h, const Node& node, const Chunk& chunk, size_t first, size_t end, double clusterSize,
+              std::vector<Disc>& discs) {
     const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
     const glm::dvec3 base = h.recordOrigin(node);
-    for (size_t i = 0; i < chunk.records.size(); ++i) {
+    for (size_t i = first; i < end; ++i) {
         const shared::PointRecord& r = chunk.records[i];
         Disc d{};
         d.place = base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
@@ -49,11 +51,17 @@ void addDiscs(const Hierarchy& h, const Node& node, const Chunk& chunk, double c
         discs.push_back(d);
     }
 }
-std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize) {
+std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize,
+                          size_t first = 0) {
     std::vector<Disc> discs;
     discs.reserve(chunk.records.size());
-    addDiscs(h, node, chunk, clusterSize, discs);
+    addDiscs(h, node, chunk, first, chunk.records.size(), clusterSize, discs);
     return discs;
+}
+
+/// Of a chunk that was read as it is drawn.
+size_t overviewOf(const Hierarchy& h, const Node& node, const Chunk& chunk) {
+    return std::min<size_t>(h.overviewOf(node), chunk.records.size());
 }
 
 /// Largest distance of a place of `leaf` from the disc `record`, at most.
@@ -240,7 +248,7 @@ Result<uint64_t> measureErrorsAt(const Store& store, uint32_t index, const Chunk
     const Node& node = h.nodes[index];
     const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
     const double clusterSize = std::exp2(static_cast<double>(h.rootLog2) - clusterLevel);
-    std::vector<Disc> records = discsOf(h, node, chunk, clusterSize);
+    std::vector<Disc> records = discsOf(h, node, chunk, clusterSize, overviewOf(h, node, chunk));
     const auto isLess = [](const Disc& a, const Disc& b) { return a.cell < b.cell; };
     std::sort(records.begin(), records.end(), isLess);
     // Discs are rounded to fp32 in between.
@@ -257,7 +265,8 @@ Result<uint64_t> measureErrorsAt(const Store& store, uint32_t index, const Chunk
     }
     std::vector<Disc> leaves;
     leaves.reserve(count);
-    for (uint32_t c = 0; c < children; ++c) addDiscs(h, h.nodes[node.firstChild + c], below[c], clusterSize, leaves);
+    for (uint32_t c = 0; c < children; ++c)
+        addDiscs(h, h.nodes[node.firstChild + c], below[c], 0, below[c].records.size(), clusterSize, leaves);
     for (const Disc& leaf : leaves) {
         // A cell may have several records, for several cones of normals: one of them stands for the leaf.
         auto at = std::lower_bound(records.begin(), records.end(), leaf, isLess);
@@ -294,15 +303,24 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
     const bool isSample = most != std::numeric_limits<uint64_t>::max();
-    if (node.isLeaf() || (isSample && !isAboveLeaves(h, node))) return 0;
+    std::vector<Disc> overview;
+    if (!isSample || node.isLeaf() || isAboveLeaves(h, node))
+        addDiscs(h, node, chunk, 0, overviewOf(h, node, chunk), 1, overview);
+    STIPPLE_ASSIGN(const uint64_t far, measureFew(store, index, overview));
+    if (node.isLeaf() || (isSample && !isAboveLeaves(h, node))) return far;
     // Clusters are cells of keys, which are as deep as a build needs, but 21 levels at least.
     uint32_t level = std::min(node.level + kClusterLevels, h.rootLog2);
-    if (!isAboveLeaves(h, node))
-        return measureFew(store, index, discsOf(h, node, chunk, std::exp2(static_cast<double>(h.rootLog2) - level)));
+    if (!isAboveLeaves(h, node)) {
+        const auto discs =
+            discsOf(h, node, chunk, std::exp2(static_cast<double>(h.rootLog2) - level), overviewOf(h, node, chunk));
+        STIPPLE_ASSIGN(const uint64_t few, measureFew(store, index, discs));
+        return far + few;
+    }
     const uint32_t least = std::min(level, 21u);
     for (; level > least; --level)
-        if (const auto measured = measureErrorsAt(store, index, chunk, most, level)) return measured;
-    return measureErrorsAt(store, index, chunk, most, level);
+        if (const auto measured = measureErrorsAt(store, index, chunk, most, level)) return far + *measured;
+    STIPPLE_ASSIGN(const uint64_t measured, measureErrorsAt(store, index, chunk, most, level));
+    return far + measured;
 }
 
 namespace {
@@ -311,10 +329,10 @@ constexpr uint32_t kNearSteps = 6;    ///< as a power of two: points in one cell
 constexpr size_t kFewNearPlaces = 8;  ///< that may lie in one
 
 /// Fast: false if no cell holds more than a few. Several cells are counted as one.
-bool mayBeCrowded(const Chunk& chunk) {
+bool mayBeCrowded(std::span<const shared::PointRecord> records) {
     constexpr uint32_t kBits = 15;
     std::vector<uint8_t> counts(size_t{1} << kBits);
-    for (const shared::PointRecord& r : chunk.records) {
+    for (const shared::PointRecord& r : records) {
         const uint32_t cell = (shared::recordX(r) >> kNearSteps) | (shared::recordY(r) >> kNearSteps) << 10 |
                               (shared::recordZ(r) >> kNearSteps) << 20;
         if (++counts[cell * 0x9e3779b1u >> (32 - kBits)] > kFewNearPlaces) return true;
@@ -328,11 +346,12 @@ Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& c
     constexpr size_t kMany = 64, kShare = 4;
     const Hierarchy& h = store.hierarchy;
     const Payload& payload = h.payload(index);
-    if (chunk.lowBits.empty() || !mayBeCrowded(chunk)) return {};
+    const size_t first = overviewOf(h, h.nodes[h.nodeOf(index)], chunk);
+    if (chunk.lowBits.empty() || !mayBeCrowded(std::span(chunk.records).subspan(first))) return {};
     using Stored = std::array<uint64_t, 3>;         // within the node's cell
     std::vector<std::pair<Stored, Stored>> places;  // where it is near others, and itself
     double off = 0;
-    for (size_t i = 0; i < chunk.records.size(); ++i) {
+    for (size_t i = first; i < chunk.records.size(); ++i) {
         const shared::PointRecord& r = chunk.records[i];
         const Stored steps{shared::recordX(r), shared::recordY(r), shared::recordZ(r)};
         std::pair<Stored, Stored> at;

@@ -11,7 +11,8 @@ namespace stipple::lod {
 /// every place of a leaf's disc has to lie within the record's error of the disc above it, and every place of a
 /// record's disc (33 of each are looked at, of about `most` records) within its error of a leaf. Of other inner nodes,
 /// below which the leaves are many, 9 places of 16 records, those with the smallest errors for their size (none where
-/// `most` is given). An error if one does not; else how many records were measured.
+/// `most` is given), and so of an overview, which comes first in a chunk as it is drawn (readDrawnChunk): that is what
+/// is to be given here. An error if one does not; else how many records were measured.
 Result<uint64_t> measureErrors(const Store& store, uint32_t node, const Chunk& chunk,
                                uint64_t most = std::numeric_limits<uint64_t>::max());
 

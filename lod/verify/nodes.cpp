@@ -66,6 +66,25 @@ bool isConeInside(const Node& node, const Node& parent) {
     return 2 * std::asin(std::min(sine, 1.0)) + coneAngle(node) <= coneAngle(parent) + kRounding;
 }
 
+/// One level of an overview is drawn, or what is below it: records of a level have one error, which is that of the next
+/// finer one's parents.
+std::string checkOverview(const Hierarchy& h, const Payload& payload, const NodeRecords& records) {
+    const uint32_t overview = h.overviewOf(payload);
+    for (uint32_t begin = 0, end = 0; begin < overview; begin = end) {
+        const uint32_t code = records.codeOf(begin);
+        while (end < overview && records.codeOf(end) == code) ++end;
+        // Those with parents of this error, or less, begin where it ends.
+        if (h.countGreater(payload.parentCounts, payload.records, code) != end)
+            return "a level of the overview does not give way to the next coarser one";
+        const uint32_t next = end < overview ? records.codeOf(end) : payload.errorCode;
+        if (next >= code) return "the errors of the overview are in the wrong order";
+        // (Of the finest: those of the root itself are all that is left.)
+        if (end == overview && h.countGreater(payload.parentCounts, payload.records, code - 1) != payload.records)
+            return "the root's own records do not give way to the overview";
+    }
+    return {};
+}
+
 }  // namespace
 
 std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
@@ -75,9 +94,19 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     const NodeRecords records(h, node, payload, chunk);
     std::array<uint32_t, 256> own{};
     uint32_t largest = 0;
-    for (size_t i = 0; i < payload.records; ++i) {
+    const uint32_t overview = h.overviewOf(payload);
+    if (overview > 0 && (number != 0 || overview >= payload.records))
+        return "records of an overview stand where there can be none";
+    for (uint32_t i = 0; i < payload.records; ++i) {
         const RecordFacts r = records.factsOf(i);
         ++own.at(r.code);
+        if (i < overview) {  // they stand for all, wherever that lies
+            if (r.code <= payload.errorCode) return "a record of the overview has no larger error than the others";
+            for (const glm::dvec3& p : r.places)
+                if (!(glm::length(p - node.centre) <= node.radius * (1 + 1e-9) + 2 * std::exp2(payload.stepShift)))
+                    return "a record of the overview is outside the bounding sphere";
+            continue;
+        }
         largest = std::max(largest, r.code);
         for (size_t k = 0; k < 2; ++k)
             if (!(glm::length(r.places.at(k) - node.centre) + r.radii.at(k) <= node.radius * (1 + 1e-9) + 1e-6))
@@ -89,7 +118,7 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     if (!h.hasOverlappingCells() && node.normalConeCosine > 0) {  // see facesAway
         const glm::dvec3 axis = coneAxis(node);
         const double widest = coneAngle(node) + kConeMargin;
-        for (const shared::PointRecord& r : chunk.records) {
+        for (const shared::PointRecord& r : std::span(chunk.records).subspan(overview)) {
             if ((shared::recordFlags(r) & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0)
                 return "a record can be seen from everywhere, but the node has a cone of normals";
             const glm::dvec3 n = glm::normalize(glm::dvec3(shared::octDecode(r.normal)));
@@ -105,13 +134,6 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
         if (h.countGreater(payload.ownCounts, payload.records, code) != left)
             return "the counts per error code are wrong";
     }
-    if (number == 0) return {};
-    const Node& parent = h.nodes[node.parent];
-    if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
-        return "the bounding sphere is not inside the parent's";
-    if (!h.hasOverlappingCells() && !isConeInside(node, parent))
-        return "the cone of normals is not inside the parent's";
-    if (payload.errorCode > h.errorCodeOf(node.parent)) return "the error is larger than the parent's";
     // Monotone along every chain: sorted by the parent's code, so the own code must not exceed it.
     uint32_t position = 0;
     for (int code = 255; code >= 0; --code) {
@@ -122,6 +144,14 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
             if (records.codeOf(position) > static_cast<uint32_t>(code))
                 return "a record has a larger error than its parent record";
     }
+    if (std::string text = checkOverview(h, payload, records); !text.empty()) return text;
+    if (number == 0) return {};
+    const Node& parent = h.nodes[node.parent];
+    if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
+        return "the bounding sphere is not inside the parent's";
+    if (!h.hasOverlappingCells() && !isConeInside(node, parent))
+        return "the cone of normals is not inside the parent's";
+    if (payload.errorCode > h.errorCodeOf(node.parent)) return "the error is larger than the parent's";
     return {};
 }
 

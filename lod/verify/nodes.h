@@ -8,7 +8,8 @@
 
 namespace stipple::lod {
 
-/// Of points and curves: codes, counts, order, sphere and cone. Empty, or what is wrong.
+/// Of points and curves, as they are drawn: codes, counts, order, sphere and cone, and that levels of an overview give
+/// way to each other. Empty, or what is wrong.
 std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk);
 /// Of a group of triangles: places, runs, and that it lies inside its parents.
 std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk);

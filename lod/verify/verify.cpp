@@ -38,14 +38,15 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
     const Hierarchy& h = store.hierarchy;
     const Payload& payload = h.payload(index);
     const KindTraits& kind = traitsOf(payload.kind);
-    STIPPLE_ASSIGN(const Chunk chunk, readChunk(store, index, true));
+    STIPPLE_ASSIGN(const Chunk chunk, readDrawnChunk(store, index, true));
     if (std::string text = kind.check(h, index, chunk); !text.empty())
         return fail(ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, h.nodeOf(index)),
                     "this is a fault of the build; please report it with the input");
-    if (payload.spacingCode != 0 && spacingCodeUp(recordSpacing(chunk.records)) != payload.spacingCode)
+    const auto spaced = std::span(chunk.records).subspan(std::min<size_t>(h.overviewOf(payload), chunk.records.size()));
+    if (payload.spacingCode != 0 && spacingCodeUp(recordSpacing(spaced)) != payload.spacingCode)
         return fail(ErrorKind::input,
                     fmt::format("its records lie {:.1f} steps apart, not {:.1f} as its table says",
-                                recordSpacing(chunk.records), spacingOfCode(payload.spacingCode)),
+                                recordSpacing(spaced), spacingOfCode(payload.spacingCode)),
                     fmt::format("{}: node {}", store.path, h.nodeOf(index)),
                     "this is a fault of the build; please report it with the input");
     // (What is beside patches has their error: they measure it.)

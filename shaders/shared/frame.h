@@ -18,7 +18,7 @@ struct DrawNode {
     float edge;       // edge of the node's cell, world units: scale of the radius codes
     uint errorCode;   // records with an own error code <= this are fine enough
     uint octantMask;  // octants whose child is not drawn: their records are drawn whatever their error; kNode...
-    uint count;       // records of the prefix
+    uint count;       // where its records end in the chunk
     uint addressLow;  // device address of the first record (gpu backend)
     uint addressHigh;
     uint level;         // depth in the octree, for the debug view

@@ -22,7 +22,7 @@ void addFields(uint64_t& hash, const T&... fields) {
 uint64_t hashOf(const lod::Cut& cut) {
     uint64_t hash = 0;
     for (const lod::CutDraw& d : cut.draw)
-        addFields(hash, d.instance, d.node, d.count, d.errorCode, d.octantMask, d.errorPixels, d.radiusScale);
+        addFields(hash, d.instance, d.node, d.first, d.count, d.errorCode, d.octantMask, d.errorPixels, d.radiusScale);
     for (const lod::CutMeshDraw& d : cut.meshDraw)
         addFields(hash, d.instance, d.node, d.firstCluster, d.clusters, d.triangles, d.errorPixels);
     for (const lod::CutWanted& w : cut.wanted) addFields(hash, w.source, w.chunk, w.priority);

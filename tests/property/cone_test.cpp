@@ -42,9 +42,10 @@ struct ConeCut {
                 continue;
             }
             ++spared;
-            const auto chunk = readChunk(store, d.node);
+            const auto chunk = readDrawnChunk(store, d.node);
             EXPECT_TRUE(chunk);
-            for (uint32_t i = 0; i < d.count; ++i) {
+            if (d.first < bare.overviewOf(bare.nodes[d.node])) continue;  // whose faces look along axes
+            for (uint32_t i = d.first; i < d.first + d.count; ++i) {
                 const reference::Disc disc = reference::decodeDisc(bare, bare.nodes[d.node], chunk->records[i]);
                 const glm::dvec3 position = place.translation + place.scale * (place.rotation * disc.position);
                 wrong += (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0 ||

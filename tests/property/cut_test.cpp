@@ -19,6 +19,7 @@ struct Tree {
         uint32_t own, parentCode, octant, parent;  ///< parent: index in the parent node's records
     };
     std::vector<std::vector<Record>> records;  ///< by node, in file order
+    uint32_t rootError = 0;                    ///< of the root's own ones, without an overview
 };
 
 /// Nested spheres.
@@ -80,6 +81,23 @@ void fillRecords(Rng& rng, Tree& t) {
     }
 }
 
+/// Up to three levels, of ever fewer records and one error each, that stand for all of the root's own (which is then
+/// no leaf's record for certain, as theirs stand for none).
+void addOverview(Rng& rng, Tree& t) {
+    auto& own = t.records[0];
+    uint32_t code = 0;
+    for (const Tree::Record& r : own) code = std::max(code, r.own);
+    t.rootError = code;
+    size_t begin = 0, count = own.size();
+    for (uint64_t level = rng.below(4); level > 0; --level) {
+        code += 1 + static_cast<uint32_t>(rng.below(12));
+        for (size_t k = begin; k < own.size(); ++k) own[k].parentCode = code;
+        begin = own.size();
+        count = (count + 2) / 3;
+        for (size_t k = 0; k < count; ++k) own.push_back({code, 255, static_cast<uint32_t>(rng.below(8)), 0});
+    }
+}
+
 /// File order; the children's parent indices follow. With the tables of counts.
 void sortRecords(Tree& t) {
     for (size_t i = 0; i < t.h.nodes.size(); ++i) {
@@ -112,6 +130,7 @@ void sortRecords(Tree& t) {
             (own ? n.ownCounts : n.parentCounts) = c;
         }
         for (const auto& x : r) n.errorCode = std::max(n.errorCode, static_cast<uint8_t>(x.own));
+        if (i == 0) n.errorCode = static_cast<uint8_t>(t.rootError);
     }
 }
 
@@ -122,6 +141,7 @@ Tree randomTree(Rng& rng, uint32_t levels) {
     t.h.rootLog2 = 20;
     growNodes(rng, levels, t);
     fillRecords(rng, t);
+    addOverview(rng, t);
     sortRecords(t);
     return t;
 }
@@ -143,10 +163,19 @@ std::string checkCoverage(const Tree& t, const Cut& cut, const std::vector<uint8
     for (const CutDraw& d : cut.draw) drawn[d.node] = d;
     const auto isDrawn = [&](uint32_t node, uint32_t record) {
         const auto d = drawn.find(node);
-        if (d == drawn.end() || record >= d->second.count) return false;
+        if (d == drawn.end() || record < d->second.first || record >= d->second.first + d->second.count) return false;
         const Tree::Record& r = t.records[node][record];
         return r.own <= d->second.errorCode || (d->second.octantMask >> r.octant & 1u) != 0;
     };
+    // A level of the overview covers all, if all of it is drawn.
+    int byOverview = 0;
+    const uint32_t overview = t.h.overviewOf(t.h.nodes[0]);
+    for (uint32_t begin = 0, end = 0; begin < overview; begin = end) {
+        uint32_t shown = 0;
+        for (; end < overview && t.records[0][end].own == t.records[0][begin].own; ++end) shown += isDrawn(0, end);
+        if (shown != 0 && shown != end - begin) return "a part of a level of the overview is drawn";
+        byOverview += shown != 0 ? 1 : 0;
+    }
     if (!drawable[0]) return cut.draw.empty() ? "" : "something is drawn without a root";
     for (uint32_t leaf = 0; leaf < t.h.nodes.size(); ++leaf) {
         if (!t.h.nodes[leaf].isLeaf()) continue;
@@ -157,7 +186,7 @@ std::string checkCoverage(const Tree& t, const Cut& cut, const std::vector<uint8
                             std::abs(glm::dot(c, view.right)) / depth * view.focalPixels < view.width / 2.0 &&
                             std::abs(glm::dot(c, view.down)) / depth * view.focalPixels < view.height / 2.0;
         for (uint32_t k = 0; k < t.records[leaf].size(); ++k) {
-            int times = 0;
+            int times = byOverview;
             uint32_t node = leaf, record = k;
             for (;;) {
                 times += isDrawn(node, record);
@@ -245,7 +274,7 @@ TEST(Cut, TheBudgetIsNeverExceededAndTheErrorRisesToMeetIt) {
             uint64_t most = 0;
             for (const CutDraw& d : s.cut.draw) {
                 uint64_t drawn = 0;
-                for (uint32_t i = 0; i < d.count; ++i) {
+                for (uint32_t i = d.first; i < d.first + d.count; ++i) {
                     const auto& r = t.records[d.node][i];
                     drawn += r.own <= d.errorCode || (d.octantMask >> r.octant & 1u);
                 }
@@ -306,9 +335,9 @@ double worstShare(const Store& store, const std::vector<test::TestPoint>& points
     const Hierarchy& h = store.hierarchy;
     std::vector<reference::Disc> drawn;
     for (const CutDraw& d : cut.draw) {
-        const auto chunk = readChunk(store, d.node);
+        const auto chunk = readDrawnChunk(store, d.node);
         EXPECT_TRUE(chunk);
-        for (uint32_t i = 0; i < d.count; ++i)
+        for (uint32_t i = d.first; i < d.first + d.count; ++i)
             if (shared::recordErrorCode(chunk->records[i]) <= d.errorCode)
                 drawn.push_back(reference::decodeDisc(h, h.nodes[d.node], chunk->records[i]));
     }

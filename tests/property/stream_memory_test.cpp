@@ -59,9 +59,9 @@ TEST_F(StreamMemory, FramesAllocateNothingOnceWarm) {
     test::writePly(folder_ / "a.ply", test::bumpySphere(60'000, 1));
     const auto store = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *several);
     for (Executor* const executor : {serial.get(), one.get(), several.get()}) {
-        const Flight flight = flyStreamed(*executor, usual(), store, 5);
+        const Flight flight = flyStreamed(*executor, usual(), store, 12);
         EXPECT_GT(flight.allocated.front(), 0u) << "the count must see what cold frames take";
-        for (size_t lap = 3; lap < 5; ++lap) {
+        for (size_t lap = 9; lap < 12; ++lap) {  // (what is there differs from lap to lap: the most nodes come late)
             EXPECT_EQ(flight.allocated[lap], 0u) << flight.uploads[lap] << " chunks came";
             EXPECT_GT(flight.uploads[lap], 40u);
             EXPECT_GT(flight.evictions[lap], 40u);

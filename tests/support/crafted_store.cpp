@@ -283,7 +283,7 @@ void changeRecords(CraftedStore& c, const lod::Store& store, const Dice& dice) {
         store.hierarchy.forEachPayload(n, [&](uint32_t index) { chunks.push_back(index); });
     const size_t i = dice(c.payloads.size());
     if (i >= chunks.size()) return;
-    auto chunk = lod::readChunk(store, chunks[i], true);
+    auto chunk = lod::readDrawnChunk(store, chunks[i], true);
     if (!chunk) return;
     for (uint64_t n = 1 + dice(3); n > 0; --n) {
         const auto change = [&](auto& items) {

@@ -48,9 +48,10 @@ std::vector<Disc> discsOfCut(const lod::Store& store, const render::FrameState& 
     std::vector<Disc> discs;
     const lod::Hierarchy& h = store.hierarchy;
     for (const lod::CutDraw& cut : state.draws.cut) {
-        const lod::Chunk chunk = chunkOf(store, cut.node);
-        for (uint32_t i = 0; i < cut.count; ++i) {
-            Disc d = reference::decodeDisc(h, h.nodes[cut.node], chunk.records[i]);
+        const auto chunk = lod::readDrawnChunk(store, cut.node);
+        if (!chunk) continue;
+        for (uint32_t i = cut.first; i < cut.first + cut.count; ++i) {
+            Disc d = reference::decodeDisc(h, h.nodes[cut.node], chunk->records[i]);
             if (d.errorCode > cut.errorCode && (cut.octantMask >> d.octant & 1u) == 0) continue;
             d.radius *= cut.radiusScale;
             discs.push_back(d);

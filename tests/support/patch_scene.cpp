@@ -55,7 +55,7 @@ const render::DrawList& PatchScene::drawsOf(const lod::View& view, const render:
                                             const lod::Instance& place) {
     place_ = place;
     lod::Cut cut;
-    cut.draw.push_back({0, 0, 0, hierarchy_.nodes[0].records, 255, 0, 1, 1});
+    cut.draw.push_back({.count = hierarchy_.nodes[0].records, .errorCode = 255, .errorPixels = 1});
     render::makeDrawList(cut, std::span(&all_, 1), std::span(&place_, 1), view, settings, draws_);
     return draws_;
 }

@@ -95,7 +95,7 @@ TEST(Attributes, LeavesKeepEveryValueAndSayItToWhoAsks) {
     for (uint32_t n = 0; n < store->hierarchy.nodes.size(); ++n) {
         const auto classes = readAttribute(*store, n, at["classification"]);
         ASSERT_TRUE(classes);
-        ASSERT_EQ(classes->size(), store->hierarchy.nodes[n].records);
+        ASSERT_EQ(classes->size(), store->hierarchy.ownRecordsOf(store->hierarchy.nodes[n]));
         for (const uint8_t c : *classes) ASSERT_TRUE(c == 2 || c == 6);
     }
 }

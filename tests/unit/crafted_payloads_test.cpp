@@ -287,9 +287,14 @@ TEST_F(CraftedPayloads, GroupsOfOctreesAreTheirOwn) {
 }
 
 TEST_F(CraftedPayloads, WhatIsFalseOfOnePayloadIsFound) {
-    // Points of the root say that they are as good as those below.
+    // Points of the root say that they are as good as those below: then they were an overview, which mixed stores do
+    // not have, nor nodes without anything below it.
     CraftedStore c = take();
     c.payloads[rootPoints].errorCode = 0;
+    expectRefused(c, "not possible");
+    // They say that they are worse than they are.
+    c = take();
+    ++c.payloads[rootPoints].errorCode;
     expectFound(c, "largest error");
     // The tubes lie elsewhere.
     const auto store = lod::openStore(folder_ / "mixed.stipple");

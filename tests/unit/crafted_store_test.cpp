@@ -86,7 +86,7 @@ TEST_F(Crafted, WhatIsOnlyWrittenAgainIsFine) {
     for (const Kind kind : {points, mesh, curves, afar, wide, mixed}) {
         CraftedStore c = take(kind);
         const lod::Store store = open(kind);
-        c.replaceChunk(0, test::encodeAgain(*lod::readChunk(store, 0, true)));
+        c.replaceChunk(0, test::encodeAgain(*lod::readDrawnChunk(store, 0, true)));
         const auto again = lod::openStore(written(c));
         ASSERT_TRUE(again) << again.error().line();
         const auto verified = lod::verifyStore(*again, *executor_);

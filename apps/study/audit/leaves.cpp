@@ -84,7 +84,8 @@ uint64_t leastShapesOf(const lod::Hierarchy& h) {
         if (h.nodes[n].isLeaf())
             h.forEachPayload(n, [&](uint32_t index) {
                 const lod::Payload& payload = h.payload(index);
-                if (payload.kind == lod::Kind::points || payload.kind == lod::Kind::curves) least += payload.records;
+                if (payload.kind == lod::Kind::points || payload.kind == lod::Kind::curves)
+                    least += h.ownRecordsOf(payload);
             });
     return least;
 }

@@ -326,6 +326,31 @@ Extent extentOf(std::span<const AggregateRecord> parts, const AggregateRecord& o
 
 }  // namespace
 
+namespace {
+
+constexpr uint32_t kClusterLevels = 6;
+
+/// Lattice position of record coordinate 0: see Hierarchy::recordOrigin.
+glm::dvec3 recordBase(const Frame& frame, const Node& node) {
+    const double half = node.stepShift > 0 ? 0.5 * (std::exp2(node.stepShift) - 1) : 0.0;
+    return glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * frame.cellSize(node.level) + half;
+}
+
+}  // namespace
+
+RecordGrid gridOf(const Frame& frame, const Node& node) {
+    const uint32_t clusterLevel = std::min(node.level + kClusterLevels, frame.keyLevels);
+    RecordGrid grid;
+    grid.base = recordBase(frame, node);
+    grid.step = std::exp2(node.stepShift);
+    grid.edge = frame.cellSize(node.level);
+    grid.clusterShift = frame.shiftOf(clusterLevel);
+    grid.cellsAcross = 1u << (clusterLevel - node.level);
+    grid.cellSteps = 65536u / grid.cellsAcross;
+    grid.errors = frame.errors;
+    return grid;
+}
+
 uint32_t radiusCodeUp(double radius, double edge) {
     const double share = radius * (1 - 2e-7) / edge;
     // 16 codes an octave: from the exponent and the bits after it; the table has the last word.
@@ -356,9 +381,10 @@ AggregateRecord aggregateOfLeaf(const Points& points, size_t i, Key key) {
 
 namespace {
 
-/// What follows from the means. `parts`: where no leaves are at hand.
+/// What follows from the means. `parts`: where no leaves are at hand. `wish`: of the disc, which reaches round all
+/// leaves if it may be as large.
 void complete(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
-              const Around& around, AggregateRecord& out) {
+              const Around& around, const DiscWish& wish, AggregateRecord& out) {
     const uint32_t normalCode = hasNormal(out) ? roundedNormal(out.normal) : 0;
     if (hasNormal(out)) out.normal = shared::octDecode(normalCode);
     // Position: to the nearest step, inside the cluster's own cell.
@@ -371,13 +397,14 @@ void complete(const RecordGrid& grid, std::span<const AggregateRecord> parts, co
     for (int a = 0; a < 3; ++a) {
         const auto at = static_cast<size_t>(a);
         const uint32_t first = static_cast<uint32_t>(index[at]) * grid.cellSteps;
-        const double wanted = std::floor((out.mean[a] - grid.base[a]) * stepsPerUnit + 0.5);
+        const double wanted = std::floor((wish.place[a] - grid.base[a]) * stepsPerUnit + 0.5);
         q[at] = toWhole<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
         out.place[a] = grid.base[a] + grid.step * q[at];
     }
     const Extent x = leaves != nullptr ? extentOfLeaves(*leaves, out.first, size_t{out.first} + out.count, out)
                                        : extentOf(parts, out);
-    const uint32_t radiusCode = radiusCodeUp(std::max(static_cast<double>(x.reach) * (1 + 1e-6), 0.5), grid.edge);
+    const double reach = std::max(static_cast<double>(x.reach) * (1 + 1e-6), 0.5);
+    const uint32_t radiusCode = radiusCodeUp(std::min(reach, wish.mostRadius), grid.edge);
     const double radius = radiusOf(radiusCode, grid.edge);
     out.radius = static_cast<float>(radius);
     out.inner = x.inner;
@@ -385,7 +412,7 @@ void complete(const RecordGrid& grid, std::span<const AggregateRecord> parts, co
     if (hasNormal(out)) {
         out.above = x.above * (1 + 1e-5f);
         out.below = x.below * (1 + 1e-5f);
-        const double sideways = std::max(0.0, radius - static_cast<double>(x.inner));
+        const double sideways = std::max({0.0, radius - static_cast<double>(x.inner), reach - radius});
         const auto slab = static_cast<double>(std::max(out.above, out.below));
         error = std::sqrt(slab * slab + sideways * sideways) * (1 + 1e-5);
     } else {
@@ -400,7 +427,8 @@ void complete(const RecordGrid& grid, std::span<const AggregateRecord> parts, co
     if (out.least != out.greatest) {
         const glm::vec3 mean(shared::srgbFromLinear(out.meanColour.x), shared::srgbFromLinear(out.meanColour.y),
                              shared::srgbFromLinear(out.meanColour.z));
-        if (colourSpread(out, mean) > kColourSpread) error = std::max(error, 2 * radius);
+        if (colourSpread(out, mean) > kColourSpread)
+            error = std::max(error, std::min(2 * std::max(radius, reach), wish.extent));
         colour = {unitToByte(mean.x), unitToByte(mean.y), unitToByte(mean.z)};
     }
     out.code = std::max(static_cast<uint8_t>(grid.errors.encodeUp(error)), out.code);
@@ -416,7 +444,18 @@ void mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> pa
     out.key = parts[0].key;
     addUp(
         parts.size(), [&](size_t i) -> const AggregateRecord& { return parts[i]; }, out);
-    complete(grid, parts, leaves, around, out);
+    complete(grid, parts, leaves, around, {out.mean}, out);
+}
+
+void mergeAtFace(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Around& around,
+                 const DiscWish& wish, AggregateRecord& out) {
+    out.key = parts[0].key;
+    addUp(
+        parts.size(), [&](size_t i) -> const AggregateRecord& { return parts[i]; }, out);
+    out.normal = out.meanNormal = wish.normal;
+    out.flags = static_cast<uint8_t>((out.flags & ~(shared::kFlagTwoSided | shared::kFlagNoNormal)) |
+                                     (wish.isTwoSided ? shared::kFlagTwoSided : 0u));
+    complete(grid, parts, nullptr, around, wish, out);
 }
 
 void mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, size_t end, const Around& around,
@@ -424,7 +463,7 @@ void mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, siz
     out.key = leaves.key[begin];
     addUp(
         end - begin, [&](size_t i) { return LeafPart(leaves, begin + i); }, out);
-    complete(grid, {}, &leaves, around, out);
+    complete(grid, {}, &leaves, around, {out.mean}, out);
 }
 
 bool splitByNormals(std::span<const AggregateRecord> parts, std::vector<uint8_t>& side) {

@@ -1,6 +1,8 @@
 // One coarse record from the finer ones in its cell.
 #pragma once
 
+#include <limits>
+
 #include "lod/builder/points/levels.h"
 
 namespace stipple::lod {
@@ -16,6 +18,9 @@ struct RecordGrid {
     uint32_t cellSteps = 1;     ///< steps of one cluster's cell
     ErrorScale errors;
 };
+
+/// Of a node: 64 clusters along its edge.
+RecordGrid gridOf(const Frame& frame, const Node& node);
 
 /// Code of the smallest radius >= `radius` at a node of this edge; but for 2e-7 relative, so that a decoded radius that
 /// was rounded to fp32 gets its own code again.
@@ -54,6 +59,17 @@ bool splitByNormals(std::span<const AggregateRecord> parts, std::vector<uint8_t>
 /// they are at hand and all points of the cell are meant. `around`: what the disc is held against.
 void mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
                      const Around& around, AggregateRecord& out);
+/// Where a disc is to lie, and how large it may be; of one that is not as its parts are, how it looks.
+struct DiscWish {
+    glm::dvec3 place{0};
+    double mostRadius = std::numeric_limits<double>::infinity();
+    glm::vec3 normal{0};
+    bool isTwoSided = false;
+    double extent = std::numeric_limits<double>::infinity();  ///< of all leaves, at most
+};
+/// The same as a disc of a normal that is given, whatever the parts have; its error counts what it leaves out.
+void mergeAtFace(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Around& around,
+                 const DiscWish& wish, AggregateRecord& out);
 /// The points [begin, end), which are all of a cluster's cell.
 void mergeLeaves(const RecordGrid& grid, const Leaves& leaves, size_t begin, size_t end, const Around& around,
                  AggregateRecord& out);

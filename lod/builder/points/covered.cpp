@@ -496,4 +496,13 @@ void measureCore(AggregateRecord& record, const Around& around, bool isAll) {
     }
 }
 
+void measureCores(std::span<AggregateRecord> records, const Around& around) {
+    const uint32_t shift = around.grid.clusterShift;
+    for (size_t first = 0, last = 0; first < records.size(); first = last) {
+        for (last = first + 1; last < records.size(); ++last)
+            if (records[last].key >> shift != records[first].key >> shift) break;
+        for (size_t k = first; k < last; ++k) measureCore(records[k], around, last == first + 1);
+    }
+}
+
 }  // namespace stipple::lod

@@ -66,5 +66,7 @@ uint32_t coveringCode(const AggregateRecord& record, const Around& around, uint3
 double coveringErrorOfBall(const AggregateRecord& record, std::span<const AggregateRecord> parts, const Leaves* leaves);
 /// Sets `core` and `hole` of a record. `isAll`: no other record stands for leaves in its cell.
 void measureCore(AggregateRecord& record, const Around& around, bool isAll);
+/// Of all records of a node, in order: those above want to know, whose leaves are not at hand there.
+void measureCores(std::span<AggregateRecord> records, const Around& around);
 
 }  // namespace stipple::lod

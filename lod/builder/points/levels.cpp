@@ -4,12 +4,14 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
 #include "lod/builder/points/aggregate.h"
 #include "lod/builder/points/aggregate_values.h"
 #include "lod/builder/points/covered.h"
+#include "lod/builder/points/overview.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/record_spacing.h"
 #include "lod/store/attributes.h"
@@ -17,8 +19,6 @@
 
 namespace stipple::lod {
 namespace {
-
-constexpr uint32_t kClusterLevels = 6;
 
 struct Box {
     glm::dvec3 lo{1e300}, hi{-1e300};
@@ -36,12 +36,6 @@ Node emptyNode(const Frame& frame, uint32_t level, Key key) {
     node.cell = {compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
     node.stepShift = static_cast<int8_t>(static_cast<int>(frame.rootLog2) - static_cast<int>(level) - 16);
     return node;
-}
-
-/// Lattice position of record coordinate 0: see Hierarchy::recordOrigin.
-glm::dvec3 recordBase(const Frame& frame, const Node& node) {
-    const double half = node.stepShift > 0 ? 0.5 * (std::exp2(node.stepShift) - 1) : 0.0;
-    return glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * frame.cellSize(node.level) + half;
 }
 
 // ---- normal cones ----
@@ -151,6 +145,7 @@ void putInnerRecords(const Frame& frame, const PendingNode& pending, Order& orde
         for (size_t a = 0; a < streams.size(); ++a)
             storeValue(frame.attributes[a], pending.values[k * streams.size() + a], record.count,
                        streams[a].data() + at * bytesOf(frame.attributes[a].type));
+        for (size_t a = 0; a < 3 && !chunk.lowBits.empty(); ++a) chunk.lowBits[at * 3 + a] = 0;
     }
 }
 
@@ -158,18 +153,23 @@ void putInnerRecords(const Frame& frame, const PendingNode& pending, Order& orde
 void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
     Node& node = pending.node;
     const bool isLeaf = node.isLeaf();
-    const size_t count = node.records;
+    const size_t count = node.records, points = isLeaf ? pending.leafParentCode.size() : 0;
+    // Points of a leaf, then records, which those of a root that is a leaf may have as an overview.
     Order order(
-        count, [&](size_t k) { return isLeaf ? pending.leafParentCode[k] : pending.records[k].parentCode; },
-        [&](size_t k) { return isLeaf ? uint8_t{0} : pending.records[k].code; });
+        count,
+        [&](size_t k) { return k < points ? pending.leafParentCode[k] : pending.records[k - points].parentCode; },
+        [&](size_t k) { return k < points ? uint8_t{0} : pending.records[k - points].code; });
     thread_local Chunk chunk;
     chunk.records.resize(count);
     chunk.lowBits.resize(isLeaf && node.stepShift > 0 ? count * 3 : 0);
     Streams streams;
     for (const AttributeInfo& a : frame.attributes) streams.emplace_back(count * bytesOf(a.type));
-    (isLeaf ? putLeafRecords : putInnerRecords)(frame, pending, order, chunk, streams);
+    if (isLeaf) putLeafRecords(frame, pending, order, chunk, streams);
+    putInnerRecords(frame, pending, order, chunk, streams);
     const std::vector<uint8_t> bytes = encodeChunk(chunk), attributes = encodeAttributes(frame.attributes, streams);
-    node.spacingCode = spacingCodeUp(recordSpacing(chunk.records));
+    // (Records of the overview come first, and are those of no surface beside these.)
+    const auto overview = std::accumulate(order.own.begin() + node.errorCode + 1, order.own.end(), size_t{0});
+    node.spacingCode = spacingCodeUp(recordSpacing(std::span(chunk.records).subspan(overview)));
     node.chunkOffset = batch.bytes.size();
     node.chunkBytes = static_cast<uint32_t>(bytes.size());
     node.chunkHash = hashBytes(bytes.data(), bytes.size());
@@ -312,19 +312,6 @@ class ConeMerger {
     std::vector<AggregateValue> values_, column_;
 };
 
-RecordGrid gridOf(const Frame& frame, const Node& node) {
-    const uint32_t clusterLevel = std::min(node.level + kClusterLevels, frame.keyLevels);
-    RecordGrid grid;
-    grid.base = recordBase(frame, node);
-    grid.step = std::exp2(node.stepShift);
-    grid.edge = frame.cellSize(node.level);
-    grid.clusterShift = frame.shiftOf(clusterLevel);
-    grid.cellsAcross = 1u << (clusterLevel - node.level);
-    grid.cellSteps = 65536u / grid.cellsAcross;
-    grid.errors = frame.errors;
-    return grid;
-}
-
 const AggregateRecord kNew;  // (a copy is made faster)
 
 /// Where the records of each cluster's cell end.
@@ -344,16 +331,6 @@ void findRuns(const PendingNode& node, uint32_t clusterShift, std::vector<uint32
         find(node.node.records, [keys = node.leaf().key](size_t k) { return keys[k]; });
     else
         find(node.node.records, [&](size_t k) { return node.records[k].key; });
-}
-
-/// What those above want to know of a node's records, whose leaves are not at hand there.
-void measureCores(std::span<AggregateRecord> records, const Around& around) {
-    const uint32_t shift = around.grid.clusterShift;
-    for (size_t first = 0, last = 0; first < records.size(); first = last) {
-        for (last = first + 1; last < records.size(); ++last)
-            if (records[last].key >> shift != records[first].key >> shift) break;
-        for (size_t k = first; k < last; ++k) measureCore(records[k], around, last == first + 1);
-    }
 }
 
 }  // namespace
@@ -424,7 +401,10 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
     return out;
 }
 
-void finishRoot(const Frame& frame, PendingNode& root, NodeBatch& batch) { encodeNode(frame, root, batch); }
+void finishRoot(const Frame& frame, PendingNode& root, NodeBatch& batch) {
+    addOverview(frame, root);
+    encodeNode(frame, root, batch);
+}
 
 namespace {
 

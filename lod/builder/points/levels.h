@@ -85,7 +85,7 @@ struct Leaves {
 /// Makes the parent of `children` (in octant order), encodes them into `batch` and empties them. `leaves`: see
 /// makeSubtree.
 PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, NodeBatch& batch, const Leaves* leaves);
-/// The root has no parent.
+/// The root has no parent, and an overview before its records (overview.h).
 void finishRoot(const Frame& frame, PendingNode& root, NodeBatch& batch);
 /// The whole subtree over the points [begin, end), which lie in one cell of `level`. Errors inside it are measured
 /// against the points themselves and not against what travels upwards, which is 25 % looser. Rounds radii to what the

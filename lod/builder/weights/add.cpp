@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <map>
+#include <span>
 
 #include "engine/base/queue.h"
 #include "lod/builder/weights/measure.h"
@@ -62,7 +63,7 @@ class Weigher {
         const Chunk& own = chunks.at(node);
         std::vector<Surfel> surfels;
         const glm::dvec3 origin = h_.recordOrigin(h_.nodes[node]);
-        append(node, own, origin, glm::vec3(-HUGE_VALF), glm::vec3(HUGE_VALF), surfels);
+        append(node, own.records, stepsOf(node, own), origin, glm::vec3(-HUGE_VALF), glm::vec3(HUGE_VALF), surfels);
         // Three rounds look as far as three kernels reach.
         constexpr float kReaches = 3, kMostMeans = 1.5f;
         float reach = 0, largest = 0;
@@ -79,31 +80,55 @@ class Weigher {
         for (const uint32_t other : nodesAbout(h_, node)) {
             if (other == node) continue;
             STIPPLE_TRY(take(other, chunks));
-            append(other, chunks.at(other), origin, lo - margin, hi + margin, surfels);
+            const Chunk& beside = chunks.at(other);
+            append(other, beside.records, stepsOf(other, beside), origin, lo - margin, hi + margin, surfels);
         }
         const std::vector<float> weights = surfelWeights(surfels);
-        std::vector<uint8_t> codes(ofNode);
-        std::transform(weights.begin(), weights.begin() + static_cast<ptrdiff_t>(ofNode), codes.begin(), weightCode);
+        STIPPLE_ASSIGN(std::vector<uint8_t> codes, weighOverview(node));
+        std::transform(weights.begin(), weights.begin() + static_cast<ptrdiff_t>(ofNode), std::back_inserter(codes),
+                       weightCode);
         return codes;
     }
 
   private:
+    float stepsOf(uint32_t node, const Chunk& chunk) const {
+        const uint8_t code = h_.nodes[node].spacingCode;
+        return code != 0 ? spacingOfCode(code) : recordSpacing(chunk.records);
+    }
+    /// Codes of the records of an overview, each level by itself.
+    Result<std::vector<uint8_t>> weighOverview(uint32_t node) const {
+        std::vector<uint8_t> codes;
+        const uint32_t overview = h_.overviewOf(h_.nodes[node]);
+        if (overview == 0) return codes;
+        STIPPLE_ASSIGN(const Chunk chunk, readDrawnChunk(store_, node));
+        const glm::dvec3 origin = h_.recordOrigin(h_.nodes[node]);
+        for (uint32_t begin = 0, end = 0; begin < overview; begin = end) {
+            const uint32_t code = shared::recordErrorCode(chunk.records[begin]);
+            while (end < overview && shared::recordErrorCode(chunk.records[end]) == code) ++end;
+            std::vector<Surfel> level;
+            append(node, std::span(chunk.records).subspan(begin, end - begin), 0, origin, glm::vec3(-HUGE_VALF),
+                   glm::vec3(HUGE_VALF), level);
+            const std::vector<float> weights = surfelWeights(level);
+            std::transform(weights.begin(), weights.end(), std::back_inserter(codes), weightCode);
+        }
+        return codes;
+    }
     Result<void> take(uint32_t node, Chunks& chunks) const {
         if (chunks.find(node) != chunks.end()) return {};
         STIPPLE_ASSIGN(Chunk chunk, readChunk(store_, node));
         chunks[node] = std::move(chunk);
         return {};
     }
-    /// Discs as mode ewa draws them; places in lattice units from `origin`. Those from `lo` to `hi`.
-    void append(uint32_t node, const Chunk& chunk, const glm::dvec3& origin, const glm::vec3& lo, const glm::vec3& hi,
-                std::vector<Surfel>& to) const {
+    /// Discs as mode ewa draws them; places in lattice units from `origin`. Those from `lo` to `hi`. `steps`: between
+    /// them.
+    void append(uint32_t node, std::span<const shared::PointRecord> records, float steps, const glm::dvec3& origin,
+                const glm::vec3& lo, const glm::vec3& hi, std::vector<Surfel>& to) const {
         const Node& n = h_.nodes[node];
         const double step = std::exp2(n.stepShift);
         const glm::dvec3 base = h_.recordOrigin(n) - origin;
         const auto edge = static_cast<float>(h_.cellSize(n));
-        const float steps = n.spacingCode != 0 ? spacingOfCode(n.spacingCode) : recordSpacing(chunk.records);
         const float spacing = steps * static_cast<float>(step);
-        for (const shared::PointRecord& r : chunk.records) {
+        for (const shared::PointRecord& r : records) {
             const uint32_t flags = shared::recordFlags(r);
             Surfel s;
             s.place = glm::vec3(base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r)));

@@ -107,7 +107,7 @@ void emitPatches(const CutFrame& frame, uint32_t i, uint32_t chunk, const Asked&
     const double delivered = deliveredPixels(slotOf(frame, i), p.errorCode, asked);
     if (asked.octantMask) cut.tauEffective = std::max(cut.tauEffective, delivered);
     tellLeafError(h.nodes[h.nodeOf(chunk)], asked.epsilon, cut);
-    cut.draw.push_back({i, h.nodeOf(chunk), chunk, p.records, asked.code, asked.octantMask,
+    cut.draw.push_back({i, h.nodeOf(chunk), chunk, 0, p.records, asked.code, asked.octantMask,
                         static_cast<float>(delivered), 1, shared::kPatchTriangles});
     cut.counters.trianglesDrawn += costOfPatches(h, chunk, asked);
 }

@@ -13,7 +13,7 @@ uint64_t bytesOfRecords(const Hierarchy& h, uint32_t chunk) {
 }
 inline bool isAnything(const Hierarchy&, uint32_t) { return true; }
 inline uint64_t recordsOfLeaf(const Hierarchy& h, uint32_t chunk) {
-    return h.nodes[h.nodeOf(chunk)].isLeaf() ? h.payload(chunk).records : 0u;
+    return h.nodes[h.nodeOf(chunk)].isLeaf() ? h.ownRecordsOf(h.payload(chunk)) : 0u;
 }
 
 }  // namespace stipple::lod
