@@ -5,6 +5,7 @@
 
 #include "lod/primitives/patch_samples.h"
 #include "lod/primitives/record_spacing.h"
+#include "lod/store/overview_levels.h"
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::render {
@@ -56,11 +57,9 @@ void DiscSizes::measureOverview(uint32_t source, std::span<const shared::PointRe
     if (overviews_.size() <= source) overviews_.resize(source + 1);
     std::vector<OfLevel>& levels = overviews_[source];
     levels.clear();
-    for (size_t begin = 0, end = 0; begin < records.size(); begin = end) {
-        const uint32_t code = shared::recordErrorCode(records[begin]);
-        while (end < records.size() && shared::recordErrorCode(records[end]) == code) ++end;
+    lod::forEachOverviewLevel(records, [&](size_t begin, size_t end) {
         levels.push_back({static_cast<uint32_t>(end), measured(records.subspan(begin, end - begin))});
-    }
+    });
 }
 
 Result<void> DiscSizes::upload(streaming::ChunkKey key, lod::Chunk chunk) {

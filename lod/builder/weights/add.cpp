@@ -9,6 +9,7 @@
 #include "engine/base/queue.h"
 #include "lod/builder/weights/measure.h"
 #include "lod/primitives/record_spacing.h"
+#include "lod/store/overview_levels.h"
 #include "lod/store/surfel_weights.h"
 #include "shaders/shared/ewa.h"
 
@@ -102,15 +103,14 @@ class Weigher {
         if (overview == 0) return codes;
         STIPPLE_ASSIGN(const Chunk chunk, readDrawnChunk(store_, node));
         const glm::dvec3 origin = h_.recordOrigin(h_.nodes[node]);
-        for (uint32_t begin = 0, end = 0; begin < overview; begin = end) {
-            const uint32_t code = shared::recordErrorCode(chunk.records[begin]);
-            while (end < overview && shared::recordErrorCode(chunk.records[end]) == code) ++end;
+        const auto records = std::span(chunk.records).first(overview);
+        forEachOverviewLevel(records, [&](size_t begin, size_t end) {
             std::vector<Surfel> level;
-            append(node, std::span(chunk.records).subspan(begin, end - begin), 0, origin, glm::vec3(-HUGE_VALF),
-                   glm::vec3(HUGE_VALF), level);
+            append(node, records.subspan(begin, end - begin), 0, origin, glm::vec3(-HUGE_VALF), glm::vec3(HUGE_VALF),
+                   level);
             const std::vector<float> weights = surfelWeights(level);
             std::transform(weights.begin(), weights.end(), std::back_inserter(codes), weightCode);
-        }
+        });
         return codes;
     }
     Result<void> take(uint32_t node, Chunks& chunks) const {
