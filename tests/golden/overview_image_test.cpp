@@ -51,6 +51,19 @@ class OverviewImages : public test::BackendsHere {
         for (const uint32_t pixel : image.rgba) count += pixel >> 24 != 0 ? 1 : 0;
         return count;
     }
+    /// Of the pixels that both show, the share whose depths are a third of a pixel apart (a hundredth of the radius, a
+    /// ten-thousandth of the distance: texels round to less), or normals two degrees.
+    static double differing(const render::Image& a, const render::Image& b) {
+        double count = 0, off = 0;
+        for (size_t i = 0; i < a.depth.size(); ++i) {
+            if (!(a.depth[i] > 0) || !(b.depth[i] > 0)) continue;
+            const glm::vec3 na(a.normal[3 * i], a.normal[3 * i + 1], a.normal[3 * i + 2]),
+                nb(b.normal[3 * i], b.normal[3 * i + 1], b.normal[3 * i + 2]);
+            ++count;
+            off += std::abs(a.depth[i] - b.depth[i]) > 1e-2f || glm::dot(na, nb) < 0.9994f ? 1 : 0;
+        }
+        return count > 0 ? off / count : 1;
+    }
     /// Mean of what is shown, linear.
     static dvec3 meanColour(const render::Image& image) {
         dvec3 sum(0);
@@ -98,10 +111,13 @@ TEST_F(OverviewImages, AreThoseOfTheOracle) {
                 ASSERT_GT(shown(expected), 1000u);
                 for (const auto& [name, backend] : backends_) {
                     SCOPED_TRACE(testing::Message() << name << ", mode " << static_cast<int>(mode) << ", tau " << tau);
-                    const auto off = reference::compareImages(
-                        test::renderView(store, *backend, *executor_, view, settings), expected, 4, nullptr);
+                    const render::Image image = test::renderView(store, *backend, *executor_, view, settings);
+                    const auto off = reference::compareImages(image, expected, 4, nullptr);
                     ASSERT_TRUE(off);
                     EXPECT_LE(off->differingFraction, 0.004);
+                    EXPECT_GE(off->silhouetteIou, 0.99);
+                    // (Discs of an overview cross: along these lines rounding says which is in front.)
+                    EXPECT_LE(differing(image, expected), 0.02) << "in depth or normal";
                 }
             }
 }
@@ -173,7 +189,7 @@ TEST_F(OverviewImages, CoverWhatTheirRecordsCovered) {
             EXPECT_LE(few.recordsTested, 2400u);
             EXPECT_GT(all.recordsTested, 100'000u);
             // (A pixel each, where all records of those that lie across a border of pixels claim two or more.)
-            EXPECT_GE(one, 300u);
+            EXPECT_GE(one, 380u);
             EXPECT_LE(one, whole);
         }
     }
