@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/runs.h"
@@ -60,12 +61,29 @@ class Complete : public testing::Test {
 };
 
 TEST_F(Complete, ABudgetBelowTheCoarsestLevelHasNoErrorToState) {
-    EXPECT_EQ(run("a.stipple -o p.png --json --budget-points 100" + size_), 6) << err_;
+    // The coarsest level of the root's overview has six records.
+    EXPECT_EQ(run("a.stipple -o p.png --json --budget-points 3" + size_), 6) << err_;
     expectOneErrorLine("--budget-points");
     EXPECT_TRUE(hasPicture());
     const auto j = nlohmann::json::parse(out_);
     EXPECT_FALSE(j["complete"].get<bool>());
     EXPECT_EQ(j["tau_eff_px"], "inf");
+}
+
+TEST_F(Complete, ABudgetOfSomeLevelOfTheOverviewHasItsError) {
+    double before = std::numeric_limits<double>::infinity();
+    for (const int budget : {6, 100, 1000}) {
+        ASSERT_EQ(run("a.stipple -o p.png --json --budget-points " + std::to_string(budget) + size_), 0) << err_;
+        EXPECT_NE(err_.find("records would bring it to 0.3 px"), std::string::npos) << err_;
+        EXPECT_TRUE(hasPicture());
+        const auto j = nlohmann::json::parse(out_);
+        EXPECT_TRUE(j["complete"].get<bool>());
+        EXPECT_GT(j["records_drawn"], 0);
+        EXPECT_LE(j["records_drawn"], budget);
+        EXPECT_LT(j["tau_eff_px"].get<double>(), before);
+        EXPECT_GT(j["tau_eff_px"].get<double>(), 0.3);
+        before = j["tau_eff_px"];
+    }
 }
 
 TEST_F(Complete, CorruptChunksAreAnErrorUnlessPermitted) {
