@@ -34,6 +34,17 @@ uint64_t hashRecords(const lod::Store& store) {
         add(hash, chunk->clusters);
         add(hash, chunk->segments);
         add(hash, chunk->texels);
+        if (!chunk->patchBlocks.empty()) {
+            add(hash, chunk->patchBlocks);
+            add(hash, chunk->patchMaps);
+            add(hash, chunk->materials);
+        }
+        if (i == 0 && h.overviewOf(h.nodes[0]) > 0) {
+            const auto drawn = lod::readDrawnChunk(store, i, true);
+            if (!drawn) throw std::runtime_error(drawn.error().line());
+            add(hash, drawn->records);
+            add(hash, drawn->lowBits);
+        }
         if (h.isTile(i) || h.payload(i).attributeBytes == 0) continue;
         for (size_t k = 0; k < store.description.attributes.size(); ++k) {
             const auto values = lod::readAttribute(store, i, k);

@@ -6,8 +6,10 @@
 #include <set>
 
 #include "lod/primitives/kinds.h"
+#include "lod/primitives/patch_map.h"
 #include "lod/store/layout.h"
 #include "lod/store/surfel_weights.h"
+#include "lod/verify/patches.h"
 #include "tests/support/store_hash.h"
 #include "tests/support/support.h"
 
@@ -21,7 +23,7 @@ struct Golden {
     size_t nodes;
     uint64_t records, table;  ///< hashes of what is decoded
 };
-constexpr std::array<Golden, 13> kGoldens{
+constexpr std::array<Golden, 15> kGoldens{
     {{"points", 6, Kind::points, 11, 0x5303292940de763c, 0x20af3ef2c3f273ac},
      {"progressive", 6, Kind::points, 1, 0xa8c37fef9aee0c9f, 0x17357675d06252b0},
      {"curves", 6, Kind::curves, 29, 0xb99341d7983e2135, 0xf4bf98ee1b06cb81},
@@ -36,7 +38,11 @@ constexpr std::array<Golden, 13> kGoldens{
      {"points", 9, Kind::points, 49, 0x32465146638ea3da, 0xe56074fae192a5a1},
      // In pages of two nodes.
      {"points", 10, Kind::points, 49, 0x32465146638ea3da, 0xe56074fae192a5a1},
-     {"mixed", 10, Kind::points, 5, 0x2e3c1d599b4d832e, 0x9c981823682b3036}}};
+     {"mixed", 10, Kind::points, 5, 0x2e3c1d599b4d832e, 0x9c981823682b3036},
+     // A sheet that shines, in 500 samples.
+     {"patches", 11, Kind::patches, 6, 0x808b552dbfa71067, 0xa5fe686ad5f17229},
+     // 260 points, with an overview.
+     {"points", 12, Kind::points, 11, 0xe4590db10100ea74, 0x8fae41a72a564903}}};
 
 std::string pathOf(const Golden& g) {
     return std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/stores/" + g.name + "_" + std::to_string(g.version) +
@@ -64,8 +70,29 @@ TEST(StoreVersions, OldBytesOpenAndHoldWhatTheyHeld) {
         EXPECT_TRUE(report) << report.error().line();
     }
     // A new version comes with its own bytes.
-    EXPECT_EQ(versions,
-              (std::set<uint32_t>{kOldVersion, kOldWideMeshVersion, kVersionBefore, kUnpagedVersion, kStoreVersion}));
+    EXPECT_EQ(versions, (std::set<uint32_t>{kOldVersion, kOldWideMeshVersion, kVersionBefore, kUnpagedVersion,
+                                            kStoreVersion, kLightVersion, kOverviewVersion}));
+}
+
+// What the two newest versions alone have is in those bytes.
+TEST(StoreVersions, LightAndOverviewsAreKeptAsBytes) {
+    const auto store = [](const char* name, uint32_t version) {
+        return openStore(pathOf({name, version, Kind::points, 0, 0, 0}));
+    };
+    const auto lit = store("patches", kLightVersion), seen = store("points", kOverviewVersion);
+    ASSERT_TRUE(lit && seen);
+    const auto patches = readPatches(*lit, 0);
+    ASSERT_TRUE(patches);
+    size_t shining = 0;
+    for (const Patch& p : *patches)
+        for (const uint32_t light : p.map.light)
+            shining += glm::length(emissionOf(light) - glm::vec3(2, 0.5f, 0)) < 0.05f;
+    EXPECT_GT(shining, 0u);
+    const Hierarchy& h = seen->hierarchy;
+    EXPECT_EQ(h.nodes[0].records, 383u);
+    EXPECT_GE(h.overviewOf(h.nodes[0]), 6u);
+    EXPECT_EQ(readChunk(*seen, 0)->records.size(), h.ownRecordsOf(h.nodes[0]));
+    EXPECT_EQ(readDrawnChunk(*seen, 0)->records.size(), h.nodes[0].records);
 }
 
 // Of build version 11: records know how far apart they lie, have weights, and name materials.
