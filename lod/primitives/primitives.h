@@ -92,6 +92,7 @@ struct SourceInfo {
     uint64_t points = 0;  ///< declared, and possible by the size of the file
     bool hasColour = false, hasNormal = false, hasRadius = false;
     bool isLattice = false;          ///< positions are whole steps: world = position * scale + offset
+    bool isCompressed = false;       ///< who reads points again decompresses them again
     glm::dvec3 scale{1}, offset{0};  ///< only where isLattice
     glm::dvec3 declaredMin{0}, declaredMax{0};
     bool hasDeclaredBounds = false;

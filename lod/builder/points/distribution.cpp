@@ -68,7 +68,7 @@ Result<void> Distribution::run(const std::vector<Journal::Entry>& entries, Build
 }
 
 Result<void> Distribution::count(BuildReport& report, StageClock& clock) {
-    STIPPLE_TRY(input_.survey(report, executor_, progress_, wanted_.keepsPlaces));
+    STIPPLE_TRY(input_.survey(report, executor_, progress_, wanted_.keepsPoints));
     clock.ends("survey");
     setFrame();
     tree_.emplace(frame_, input_.points);

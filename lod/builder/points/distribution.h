@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "engine/base/huge_region.h"
 #include "lod/builder/octree/workspace.h"
 #include "lod/builder/points/bucket.h"
 #include "lod/builder/points/input.h"
@@ -14,9 +15,8 @@ class Distribution {
     struct Plan {
         int workers = 1;
         uint64_t bufferBytes = 0, bucketPoints = 0;
-        bool wantGhosts = false;  ///< neighbours are looked at
-        bool keepsPlaces =
-            false;  ///< from the survey to the count: 12 bytes a point, which are planned for the buckets
+        bool wantGhosts = false;   ///< neighbours are looked at
+        bool keepsPoints = false;  ///< of the survey (PointInput::survey), in what is planned for the buckets
     };
     /// `layout`: is told how places are held, once the input was surveyed.
     Distribution(PointInput& input, const BuildSettings& settings, RecordLayout& layout, const Plan& plan,

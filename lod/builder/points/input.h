@@ -8,11 +8,11 @@
 #include <memory>
 #include <optional>
 
-#include "engine/base/huge_region.h"
 #include "engine/base/numbers.h"
 #include "lod/builder/build.h"
 #include "lod/builder/lattice.h"
 #include "lod/builder/octree/bytes.h"
+#include "lod/builder/points/kept_points.h"
 #include "lod/builder/points/outliers.h"
 #include "lod/builder/points/points.h"
 
@@ -33,10 +33,11 @@ class PointInput {
     /// Of names, sizes and times of the files: does a build that was interrupted go on with the same input?
     uint64_t identity() const;
 
-    /// Reads everything once: bounds, which parts are corrupt, what the colours mean. Fills `report`. `keepsPlaces`: of
-    /// points on a lattice the places stay in memory (12 bytes a point), so that who asks for places alone need not
-    /// read and decompress them again.
-    Result<void> survey(BuildReport& report, Executor& executor, Progress& progress, bool keepsPlaces = false);
+    /// Reads everything once: bounds, which parts are corrupt, what the colours mean. Fills `report`. `keepsPoints`: of
+    /// points on a lattice the places stay in memory (12 bytes a point), of compressed ones all that was read (6 for a
+    /// colour, and what attributes take), so that read() need not read and decompress them again.
+    Result<void> survey(BuildReport& report, Executor& executor, Progress& progress, bool keepsPoints = false);
+    /// Nobody asks for places alone any more.
     void dropPlaces();
     /// One for each worker, to be given to one whole read() and then to concludeOutliers(); none where nothing is far
     /// or outliers are known.
@@ -65,7 +66,7 @@ class PointInput {
 
     /// Calls sink(points) for all points, in blocks, from several threads at once; a thread has one `worker` number
     /// below `workers`. Fails if the input is not what was surveyed. Returns the largest rounding of a coordinate,
-    /// world units.
+    /// world units. What all was kept of is given once: then it goes.
     using Sink = std::function<Result<void>(int worker, const Points& block)>;
     /// Parts [begin, end), before which lie that many points.
     struct Range {
@@ -97,7 +98,6 @@ class PointInput {
         std::vector<glm::dvec3> places;  ///< likewise, each once
         Bounds near;                     ///< of what is not far, where outliers are left out; common coordinates
         uint64_t far = 0;
-        bool isKept = false;  ///< its places are in kept_
     };
 
     Result<void> openAll(const std::vector<std::string>& inputs, const BuildSettings& settings, BuildReport& report);
@@ -113,8 +113,10 @@ class PointInput {
     Result<void> checkParts() const;
     void tally(BuildReport& report);
     Result<void> surveyPart(Part& part, PointBlock& block) const;
-    void keep(const Part& part, const PointBlock& block, uint64_t at) const;
-    Result<PointReader> openPlaces(const Part& part) const;
+    size_t numberOf(const Part& part) const { return static_cast<size_t>(&part - parts_.data()); }
+    std::unique_ptr<KeptPoints> roomToKeep(bool keepsPoints) const;
+    bool isKept(const Part& part, KeptPoints::What what) const { return kept_ && kept_->has(numberOf(part), what); }
+    Result<PointReader> openPart(const Part& part, Wanted wanted) const;
     void surveyBounds(const PointBlock& block, size_t count, Part& part) const;
     void surveyColours(const PointBlock& block, size_t count, Part& part) const;
     void findSpan();
@@ -149,7 +151,7 @@ class PointInput {
     BuildSettings settings_;
     std::vector<PointSource> sources_;
     std::vector<Part> parts_;
-    std::unique_ptr<HugeRegion> kept_;  ///< of each part the places, glm::ivec3
+    std::unique_ptr<KeptPoints> kept_;
     std::vector<AttributeInfo> attributes_;
     std::vector<std::vector<uint8_t>> materialOf_;  ///< of each source: its materials' numbers in `materials`
     CommonLattice lattice_;                         ///< where all sources are lattices

@@ -115,7 +115,7 @@ Result<void> PointInput::findOutliers(Executor& executor) {
 }
 
 Result<void> PointInput::findFar(Part& part, PointBlock& block, FarCubes& cubes) const {
-    STIPPLE_ASSIGN(const PointReader read, openPlaces(part));
+    STIPPLE_ASSIGN(const PointReader read, openPart(part, Wanted::places));
     part.near = {};
     part.far = 0;
     for (;;) {

@@ -54,28 +54,15 @@ Result<double> PointInput::read(Executor& executor, int workers, Progress& progr
     return *std::max_element(roundings.begin(), roundings.end()) * (allLattice_ ? unit / step_ : unit);
 }
 
-/// The places of a block that begins with the part's point `at`.
-void PointInput::keep(const Part& part, const PointBlock& block, uint64_t at) const {
-    const std::span<uint8_t> to = kept_->part(static_cast<size_t>(&part - parts_.data()));
-    std::memcpy(to.data() + at * sizeof(glm::ivec3), block.lattice.data(), block.lattice.size() * sizeof(glm::ivec3));
-}
-
 /// What the survey kept of it, or else from the file, with all that it has.
-Result<PointReader> PointInput::openPlaces(const Part& part) const {
-    if (!part.isKept) return sources_[part.source].openPart(part.index);
-    const uint8_t* const from = kept_->part(static_cast<size_t>(&part - parts_.data())).data();
-    return PointReader([&part, from, at = uint64_t{0}](PointBlock& block, size_t limit) mutable -> Result<size_t> {
-        const size_t count = std::min<uint64_t>(limit, part.count - at);
-        block.lattice.resize(count);
-        std::memcpy(block.lattice.data(), from + at * sizeof(glm::ivec3), count * sizeof(glm::ivec3));
-        at += count;
-        return count;
-    });
+Result<PointReader> PointInput::openPart(const Part& part, Wanted wanted) const {
+    const auto what = wanted == Wanted::all ? KeptPoints::What::all : KeptPoints::What::places;
+    if (isKept(part, what)) return kept_->read(numberOf(part), what);
+    return sources_[part.source].openPart(part.index);
 }
 
 void PointInput::dropPlaces() {
-    for (Part& part : parts_) part.isKept = false;
-    kept_ = nullptr;
+    if (kept_) kept_->releasePlaces();
 }
 
 Result<void> PointInput::readPart(const Part& part, Wanted wanted, PointBlock& block, Points& out, double& rounding,
@@ -84,7 +71,8 @@ Result<void> PointInput::readPart(const Part& part, Wanted wanted, PointBlock& b
     const auto changed = [&] {
         return fail(ErrorKind::input, "changed while it was read", from.info.path, "build again when it is complete");
     };
-    STIPPLE_ASSIGN(const PointReader read, wanted == Wanted::places ? openPlaces(part) : from.openPart(part.index));
+    STIPPLE_ASSIGN(const PointReader read, openPart(part, wanted));
+    const bool isFilled = wanted == Wanted::all || !allLattice_ || !isKept(part, KeptPoints::What::places);
     const bool isWatched = far != nullptr && outliers_.reaches(boundsOf(part));
     uint64_t usable = 0, farPoints = 0;
     for (uint64_t at = 0;;) {
@@ -92,6 +80,7 @@ Result<void> PointInput::readPart(const Part& part, Wanted wanted, PointBlock& b
         STIPPLE_ASSIGN(size_t count, read(block, kBlockPoints));
         if (count == 0) {
             if (at != part.count || usable != part.usable || farPoints != part.far) return changed();
+            if (wanted == Wanted::all && isKept(part, KeptPoints::What::all)) kept_->release(numberOf(part));
             return {};
         }
         if (count > part.count - at || block.colourMax > std::max(sourceColourMax_[part.source], 255u))
@@ -111,7 +100,7 @@ Result<void> PointInput::readPart(const Part& part, Wanted wanted, PointBlock& b
         } else {
             farPoints = part.far;
         }
-        if (wanted == Wanted::all || !part.isKept || !allLattice_) fill(part, block, out);
+        if (isFilled) fill(part, block, out);
         place(part, block, count, out, rounding);
         usable += out.size();
         if (!isWithin(out)) return changed();

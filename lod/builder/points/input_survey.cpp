@@ -19,13 +19,10 @@ constexpr double kLatticeLimit = 9007199254740991.0;  // 2^kPlaceBits - 1
 
 }  // namespace
 
-Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progress& progress, bool keepsPlaces) {
+Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progress& progress, bool keepsPoints) {
     constexpr uint64_t kSample = 65536;
     sampleShare = declared_ / kSample + 1;
-    std::vector<uint64_t> sizes;
-    for (const Part& part : parts_)
-        sizes.push_back(keepsPlaces && sources_[part.source].info.isLattice ? part.count * sizeof(glm::ivec3) : 0);
-    kept_ = std::make_unique<HugeRegion>(sizes);
+    kept_ = roomToKeep(keepsPoints);
     std::atomic<bool> stop{false};
     std::atomic<uint64_t> done{0};
     executor.parallelFor(parts_.size(), 1, [&](size_t begin, size_t end) {
@@ -46,6 +43,21 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
     STIPPLE_TRY(conclude(report));
     placeSample();
     return {};
+}
+
+std::unique_ptr<KeptPoints> PointInput::roomToKeep(bool keepsPoints) const {
+    std::vector<KeptPoints::Part> parts;
+    for (const Part& part : parts_) {
+        const SourceInfo& info = sources_[part.source].info;
+        const bool hasMore = info.hasNormal || info.hasRadius || !info.materials.empty();
+        const auto what = !keepsPoints || !info.isLattice ? KeptPoints::What::nothing
+                          : info.isCompressed && !hasMore ? KeptPoints::What::all
+                                                          : KeptPoints::What::places;
+        parts.push_back({part.count, what, info.hasColour});
+    }
+    std::vector<size_t> widths;
+    for (const AttributeInfo& a : attributes_) widths.push_back(bytesOf(a.type));
+    return std::make_unique<KeptPoints>(std::move(parts), std::move(widths));
 }
 
 Result<void> PointInput::checkParts() const {
@@ -189,19 +201,20 @@ Result<void> PointInput::surveyPart(Part& part, PointBlock& block) const {
     const PointSource& from = sources_[part.source];
     STIPPLE_ASSIGN(const PointReader read, from.openPart(part.index));
     PlaceSample places(declared_);
-    const bool isKept = !kept_->part(static_cast<size_t>(&part - parts_.data())).empty();
     for (uint64_t at = 0;;) {
         block.clear();
         STIPPLE_ASSIGN(const size_t count, read(block, kBlockPoints));
         if (count == 0) {
             part.places = places.take();
-            part.isKept = isKept && at == part.count;
-            if (at == part.count) return {};
+            if (at == part.count) {
+                kept_->finish(numberOf(part));
+                return {};
+            }
             return fail(ErrorKind::input, fmt::format("has {} points instead of {}", at, part.count), from.info.path);
         }
         if (count > part.count - at) return fail(ErrorKind::input, "has more points than it declares", from.info.path);
         surveyBounds(block, count, part);
-        if (isKept) keep(part, block, at);
+        kept_->keep(numberOf(part), at, block);
         for (const glm::ivec3& p : block.lattice) places.add(p);
         for (const glm::dvec3& p : block.position)
             if (isPlace(p)) places.add(p);

@@ -201,6 +201,7 @@ Result<PointSource> openLas(const OpenBytes& open, const ReadOptions& options) {
     info.format = h.describe();
     info.points = h.points;
     info.isLattice = true;
+    info.isCompressed = h.laz.has_value();
     info.up = UpAxis::z;
     info.scale = h.scale;
     info.offset = h.offset;
