@@ -2,6 +2,8 @@
 // one.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -183,6 +185,32 @@ TEST(RecordSpacing, IsThatOfTheGrid) {
     EXPECT_EQ(lod::recordSpacing({}), 0.0f);
     EXPECT_EQ(lod::recordSpacing(std::vector<PointRecord>(6)), 0.0f);
     EXPECT_EQ(lod::recordSpacing(std::vector<PointRecord>(50)), 0.0f);  // all at one place
+}
+
+// Stars of seven, whose tips have their sixth neighbour at the other tip: were one missed or counted twice, it would be
+// another star's, or a tip beside.
+TEST(RecordSpacing, MissesNoNeighbourWhereverItStands) {
+    constexpr uint32_t kArm = 20, kApart = 500, kAcross = 20;
+    Rng rng(7);
+    for (const uint32_t stars : {1u, 2u, 3u, 5u, 9u, 40u, 101u, 399u})
+        for (const bool isShuffled : {false, true}) {
+            std::vector<PointRecord> records;
+            for (uint32_t s = 0; s < stars; ++s) {
+                const uint32_t x = 100 + s % kAcross * kApart, y = 100 + s / kAcross * kApart, z = 100;
+                for (const auto& [dx, dy, dz] : {std::array{0u, 0u, 0u},
+                                                 {kArm, 0u, 0u},
+                                                 {-kArm, 0u, 0u},
+                                                 {0u, kArm, 0u},
+                                                 {0u, -kArm, 0u},
+                                                 {0u, 0u, kArm},
+                                                 {0u, 0u, -kArm}})
+                    records.push_back({(x + dx) | (y + dy) << 16, z + dz, 0, 0});
+            }
+            for (size_t i = records.size(); isShuffled && i > 1; --i)
+                std::swap(records[i - 1], records[std::min(i - 1, static_cast<size_t>(rng.uniform(0, double(i))))]);
+            EXPECT_FLOAT_EQ(lod::recordSpacing(records), std::sqrt(3.14159265f / 6.5f) * 2 * kArm)
+                << stars << isShuffled;
+        }
 }
 
 /// Eighths of octaves, rounded up: never less, and less than a tenth more.
