@@ -9,19 +9,12 @@
 
 #include "lod/primitives/triangle.h"
 #include "lod/store/mesh_place.h"
+#include "lod/verify/discs.h"
 
 namespace stipple::lod {
 namespace {
 
 constexpr uint32_t kClusterLevels = 6;  ///< a record stands for a cell that many levels below its node's
-
-struct Disc {
-    std::array<uint64_t, 3> cell;  ///< of the clusters
-    glm::dvec3 place, normal;
-    double radius;
-    uint32_t code;
-    bool hasNormal;
-};
 
 /// Has it children, and all of them are leaves?
 bool isAboveLeaves(const Hierarchy& h, const Node& node) {
@@ -30,38 +23,12 @@ bool isAboveLeaves(const Hierarchy& h, const Node& node) {
     return !node.isLeaf();
 }
 
-/// Of records [first, end).
-void addDiscs(const Hierarchy& h, const Node& node, const Chunk& chunk, size_t first, size_t end, double clusterSize,
-              std::vector<Disc>& discs) {
-    const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
-    const glm::dvec3 base = h.recordOrigin(node);
-    for (size_t i = first; i < end; ++i) {
-        const shared::PointRecord& r = chunk.records[i];
-        Disc d{};
-        d.place = base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
-        if (!chunk.lowBits.empty())  // the exact place instead of the middle of its step
-            d.place +=
-                glm::dvec3(chunk.lowBits[3 * i], chunk.lowBits[3 * i + 1], chunk.lowBits[3 * i + 2]) - 0.5 * (step - 1);
-        d.normal = glm::dvec3(glm::vec3(shared::octDecode(r.normal)));
-        d.hasNormal = (shared::recordFlags(r) & shared::kFlagNoNormal) == 0;
-        d.radius = edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
-        d.code = shared::recordErrorCode(r);
-        for (int a = 0; a < 3; ++a)
-            d.cell.at(static_cast<size_t>(a)) = static_cast<uint64_t>(std::max(d.place[a], 0.0) / clusterSize);
-        discs.push_back(d);
-    }
-}
 std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize,
                           size_t first = 0) {
     std::vector<Disc> discs;
     discs.reserve(chunk.records.size());
     addDiscs(h, node, chunk, first, chunk.records.size(), clusterSize, discs);
     return discs;
-}
-
-/// Of a chunk that was read as it is drawn.
-size_t overviewOf(const Hierarchy& h, const Node& node, const Chunk& chunk) {
-    return std::min<size_t>(h.overviewOf(node), chunk.records.size());
 }
 
 /// Largest distance of a place of `leaf` from the disc `record`, at most.
@@ -73,15 +40,6 @@ double distanceOf(const Disc& record, const Disc& leaf) {
     const double rise = leaf.radius * std::sqrt(std::max(0.0, 1 - along * along));
     const double sideways = std::max(0.0, glm::length(d - height * record.normal) + leaf.radius - record.radius);
     return std::hypot(std::abs(height) + rise, sideways);
-}
-
-/// Distance of a place from a leaf's disc. One without a normal turns with the view: only its centre is there in all of
-/// them, unless the record turns as well.
-double distanceOf(const glm::dvec3& place, const Disc& leaf, bool isBall) {
-    const glm::dvec3 d = place - leaf.place;
-    if (!leaf.hasNormal) return std::max(0.0, glm::length(d) - (isBall ? leaf.radius : 0.0));
-    const double height = glm::dot(d, leaf.normal);
-    return std::hypot(height, std::max(0.0, glm::length(d - height * leaf.normal) - leaf.radius));
 }
 
 tl::unexpected<Error> wrong(const Store& store, uint32_t index, std::string what) {
@@ -147,27 +105,6 @@ class LeafGrid {
     std::array<uint64_t, 3> first_{};
     std::vector<uint32_t> start_, order_;
 };
-
-/// Largest distance of some places of a record's disc (or ball) from the leaves, if it exceeds `enough`; else less.
-/// `distanceOf(place)`: from the leaves.
-template <typename DistanceOf>
-double farthestPlace(const Disc& record, int rings, int angles, double enough, const DistanceOf& distanceOf) {
-    double worst = 0;
-    const auto look = [&](const glm::dvec3& off) {
-        if (worst <= enough) worst = std::max(worst, distanceOf(record.place + record.radius * off));
-    };
-    look(glm::dvec3(0));
-    const glm::dvec3 n = record.hasNormal ? record.normal : glm::dvec3(0, 0, 1);
-    const glm::dvec3 t = glm::normalize(std::abs(n.x) < 0.7 ? glm::dvec3(0, -n.z, n.y) : glm::dvec3(-n.z, 0, n.x)),
-                     b = glm::cross(n, t);
-    for (int ring = 1; ring <= rings; ++ring)
-        for (int k = 0; k < angles; ++k) {
-            const double angle = 6.283185307179586 * k / angles, share = static_cast<double>(ring) / rings;
-            look(share * (std::cos(angle) * t + std::sin(angle) * b));
-            if (!record.hasNormal) look(share * (std::cos(angle) * t + std::sin(angle) * n));
-        }
-    return worst;
-}
 
 /// The leaves below a node, read as they are asked for.
 class LeavesBelow {

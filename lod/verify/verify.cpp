@@ -15,10 +15,13 @@
 #include "lod/store/store.h"
 #include "lod/store/surfel_weights.h"
 #include "lod/verify/errors.h"
+#include "lod/verify/overviews.h"
 
 namespace stipple::lod {
 
 namespace {
+
+constexpr uint64_t kLeavesOfAll = 256;  ///< records of a leaf that are held against overviews, at most
 
 struct Counts {
     std::atomic<uint64_t> nodes{0}, payloads{0}, records{0}, leafRecords{0}, measured{0};
@@ -34,7 +37,8 @@ Result<void> checkWeights(const Store& store, uint32_t index, const std::vector<
 }
 
 /// Reads one payload and all of its streams. `discs`: see measure.
-Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, Counts& counts) {
+Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, const OverviewLevels& overview,
+                           Counts& counts) {
     const Hierarchy& h = store.hierarchy;
     const Payload& payload = h.payload(index);
     const KindTraits& kind = traitsOf(payload.kind);
@@ -53,6 +57,10 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
     if (!h.isStochastic && (!h.isMixed || payload.kind == Kind::patches)) {
         STIPPLE_ASSIGN(const uint64_t measured, kind.measure(store, index, chunk, discs));
         counts.measured += measured;
+    }
+    if (payload.kind == Kind::points && h.nodes[h.nodeOf(index)].isLeaf()) {
+        STIPPLE_ASSIGN(const uint64_t seen, overview.measure(h.nodeOf(index), chunk, std::min(discs, kLeavesOfAll)));
+        counts.measured += seen;
     }
     STIPPLE_TRY(checkDrawnPlaces(store, index, chunk));
     STIPPLE_TRY(checkSampleMaterials(store, index, chunk));
@@ -80,13 +88,14 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_
     // Of a sample of nodes a sample of their discs is held against the leaves.
     const uint64_t discs = nodes == 0 ? std::numeric_limits<uint64_t>::max() : 64;
     const size_t stride = nodes == 0 ? 1 : h.nodes.size() / nodes + 1;
+    const OverviewLevels overview(store);
     Counts counts;
     CompletionQueue<std::pair<size_t, Error>> problems;
     executor.parallelFor((h.nodes.size() + stride - 1) / stride, 1, [&](size_t begin, size_t end) {
         for (size_t i = begin * stride; i < end * stride && i < h.nodes.size() && !isStopRequested(); i += stride) {
             ++counts.nodes;
             h.forEachPayload(static_cast<uint32_t>(i), [&](uint32_t chunk) {
-                if (const auto right = verifyPayload(store, chunk, discs, counts); !right)
+                if (const auto right = verifyPayload(store, chunk, discs, overview, counts); !right)
                     problems.push({i, right.error()});
             });
         }

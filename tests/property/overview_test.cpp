@@ -17,6 +17,7 @@
 #include "lod/store/leaves.h"
 #include "lod/store/store.h"
 #include "lod/store/surfel_weights.h"
+#include "tests/support/crafted_store.h"
 #include "tests/support/support.h"
 
 namespace stipple::lod {
@@ -175,6 +176,37 @@ TEST_F(Overviews, AreWithinTheirErrorBothWays) {
                 EXPECT_LT(levels_[k].code, levels_[k - 1].code);
                 EXPECT_GE(levels_[k].discs.size(), (k == 1 ? 1 : 2) * levels_[k - 1].discs.size());
             }
+        }
+}
+
+// Who verifies looks both ways, too: at leaves that no disc of a level is near enough, and at discs that no leaf is.
+TEST_F(Overviews, AreFoundWhereTheirErrorsAreFalse) {
+    struct Case {
+        const char *shape, *says;
+        uint32_t radius;
+    };
+    for (const auto& [shape, says, radius] : {Case{"plane", "of the overview's level of", 60},
+                                              {"sphere", "of the overview's level of", 60},
+                                              {"house", "off the nearest leaf", 255}})
+        for (const uint32_t leafRecords : {256u, 8192u}) {
+            SCOPED_TRACE(testing::Message() << shape << ", leaves of " << leafRecords);
+            make(shape, 6'000, leafRecords);
+            if (HasFatalFailure()) return;
+            EXPECT_TRUE(verifyStore(*store_, *executor_));
+            auto chunk = readDrawnChunk(*store_, 0, true);
+            ASSERT_TRUE(chunk);
+            for (uint32_t i = 0; i < store_->hierarchy.overviewOf(store_->hierarchy.nodes[0]); ++i) {
+                uint32_t& word = chunk->records[i].positionZRadiusError;
+                word = (word & 0xff00ffffu) | radius << 16;
+            }
+            auto crafted = test::CraftedStore::read(folder_ / "a.stipple");
+            crafted.replaceChunk(0, test::encodeAgain(*chunk));
+            crafted.write(folder_ / "b.stipple");
+            const auto wrong = openStore(folder_ / "b.stipple");
+            ASSERT_TRUE(wrong);
+            const auto verified = verifyStore(*wrong, *executor_);
+            ASSERT_FALSE(verified);
+            EXPECT_NE(verified.error().line().find(says), std::string::npos) << verified.error().line();
         }
 }
 
