@@ -345,7 +345,7 @@ Result<Planned> PointStages::planMemory() {
         return std::min<uint64_t>(bytes / ((workers + 1) * pointBytes()), uint64_t{1} << 20);
     };
     // (Half of the memory at most: what neighbours see, buffers and the allocator's own losses come on top. What the
-    // survey keeps is less than that half, and goes as the buckets fill.)
+    // survey keeps, 18 bytes a point with a colour, lies in this room as well, and goes as the buckets fill.)
     const bool isOnDisk = 2 * all + (workers + 1) * kSubtreePoints * pointBytes() > room && small > room + fixed;
     bufferBytes_ = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
     bucketPoints_ = bucketOf(isOnDisk ? room / 2 : room / 4);

@@ -17,7 +17,7 @@ constexpr size_t kNeighbours = 6;
 constexpr size_t kProbes = 24;  // their median is within a tenth of that of all
 constexpr float kPi = 3.14159265f;
 constexpr size_t kBlock = 2 * kLanes;    // records that follow each other, whose box is asked first
-constexpr size_t kBlocksBeside = 4;      // to each side of a record's own
+constexpr size_t kBlocksBeside = 4;      // before a record's own, and from that on
 constexpr float kRoundedUp = 1 + 1e-6f;  // more than what floats may be off, here and there
 
 using Place = std::array<float, 3>;

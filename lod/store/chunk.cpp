@@ -17,8 +17,9 @@
 namespace stipple::lod {
 namespace {
 
-// Level 3 saves 1 % of the bytes and takes twice the time on scans. What comes here is 14 KB, and has few repetitions:
-// with a table of 512 places for them (it would be 32,768, emptied for each) zstd takes 0.7 of the time.
+// Level 3 saves 1 % of the bytes and takes twice the time on scans. Chunks of points are 14 KB and have few
+// repetitions: with a table of 512 places for them, where level 1 empties one of 32,768 each time, zstd takes 0.7 of
+// the time (0.1 % more bytes; forests, of curves, 1.7 %).
 constexpr int kZstdLevel = 1, kLog2Places = 9, kShortestMatch = 5;
 
 constexpr uint32_t kNotFinite = 0x7f800000u;  // the exponent of infinities and NaN

@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
+#include <utility>
+#include <vector>
 
 #include "engine/base/rng.h"
 #include "engine/cpu/cpu_backend.h"
@@ -187,30 +188,45 @@ TEST(RecordSpacing, IsThatOfTheGrid) {
     EXPECT_EQ(lod::recordSpacing(std::vector<PointRecord>(50)), 0.0f);  // all at one place
 }
 
-// Stars of seven, whose tips have their sixth neighbour at the other tip: were one missed or counted twice, it would be
-// another star's, or a tip beside.
-TEST(RecordSpacing, MissesNoNeighbourWhereverItStands) {
-    constexpr uint32_t kArm = 20, kApart = 500, kAcross = 20;
-    Rng rng(7);
-    for (const uint32_t stars : {1u, 2u, 3u, 5u, 9u, 40u, 101u, 399u})
-        for (const bool isShuffled : {false, true}) {
-            std::vector<PointRecord> records;
-            for (uint32_t s = 0; s < stars; ++s) {
-                const uint32_t x = 100 + s % kAcross * kApart, y = 100 + s / kAcross * kApart, z = 100;
-                for (const auto& [dx, dy, dz] : {std::array{0u, 0u, 0u},
-                                                 {kArm, 0u, 0u},
-                                                 {-kArm, 0u, 0u},
-                                                 {0u, kArm, 0u},
-                                                 {0u, -kArm, 0u},
-                                                 {0u, 0u, kArm},
-                                                 {0u, 0u, -kArm}})
-                    records.push_back({(x + dx) | (y + dy) << 16, z + dz, 0, 0});
-            }
-            for (size_t i = records.size(); isShuffled && i > 1; --i)
-                std::swap(records[i - 1], records[std::min(i - 1, static_cast<size_t>(rng.uniform(0, double(i))))]);
-            EXPECT_FLOAT_EQ(lod::recordSpacing(records), std::sqrt(3.14159265f / 6.5f) * 2 * kArm)
-                << stars << isShuffled;
+/// The same median of the same records, each held against all others.
+float spacingBySearch(const std::vector<PointRecord>& records) {
+    std::vector<int64_t> sixths;
+    for (size_t p = 0; p < std::min<size_t>(24, records.size()); ++p) {
+        const PointRecord& from = records[(p * 2654435761u + 12345u) % records.size()];
+        std::vector<int64_t> squares;
+        for (const PointRecord& r : records) {
+            const int64_t x = int64_t{shared::recordX(r)} - shared::recordX(from),
+                          y = int64_t{shared::recordY(r)} - shared::recordY(from),
+                          z = int64_t{shared::recordZ(r)} - shared::recordZ(from);
+            squares.push_back(x * x + y * y + z * z);
         }
+        std::sort(squares.begin(), squares.end());
+        sixths.push_back(squares[6]);
+    }
+    std::sort(sixths.begin(), sixths.end());
+    return std::sqrt(3.14159265f * static_cast<float>(sixths[sixths.size() / 2]) / 6.5f);
+}
+
+// In any order and of any number: of blocks that are asked first none may be left out.
+TEST(RecordSpacing, IsThatOfASearchThroughAll) {
+    Rng rng(7);
+    for (const size_t count : {7, 8, 15, 16, 17, 100, 127, 128, 129, 145, 300, 1000})
+        for (const bool isOrdered : {false, true})
+            for (int set = 0; set < 20; ++set) {
+                const double extent = set % 2 == 0 ? 65535 : 3000;
+                std::vector<PointRecord> records;
+                for (size_t i = 0; i < count; ++i) {
+                    const auto at = [&] { return static_cast<uint32_t>(rng.uniform(0, extent)); };
+                    const uint32_t x = at(), y = at(), z = set % 4 < 2 ? at() : 100;
+                    records.push_back({x | y << 16, z, 0, 0});
+                }
+                const auto isBefore = [](const PointRecord& a, const PointRecord& b) {
+                    return std::pair(a.positionXY >> 28, a.positionXY & 0xffffu) <
+                           std::pair(b.positionXY >> 28, b.positionXY & 0xffffu);
+                };
+                if (isOrdered) std::sort(records.begin(), records.end(), isBefore);
+                ASSERT_EQ(lod::recordSpacing(records), spacingBySearch(records)) << count << ", set " << set;
+            }
 }
 
 /// Eighths of octaves, rounded up: never less, and less than a tenth more.

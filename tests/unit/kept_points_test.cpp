@@ -134,6 +134,42 @@ TEST(KeptPoints, AreThoseOfEachFilesOwnKind) {
     EXPECT_EQ(scans.all(), before);
 }
 
+// What a source gives beside colours and attributes is in its file alone; so is a part that was not read to its end.
+TEST(KeptPoints, OfMoreThanIsKeptThereAreNoWholeOnes) {
+    using What = KeptPoints::What;
+    KeptPoints kept({{2, What::all, true}, {2, What::all, true}, {2, What::all, false}, {2, What::places, true}}, {2});
+    PointBlock block;
+    block.lattice = {{1, 2, 3}, {-4, 5, 6}};
+    block.colour16 = {0x0001'ffff'8000, 0xffff'0000'0102};
+    block.attributes = {{7, 8, 9, 10}};
+    for (const size_t part : {0, 1, 3}) kept.keep(part, 0, block);
+    block.colour16.clear();
+    block.normal.resize(2);
+    kept.keep(2, 0, block);
+    for (const size_t part : {0, 2, 3}) kept.finish(part);
+    EXPECT_TRUE(kept.has(0, What::all));
+    EXPECT_FALSE(kept.has(1, What::places)) << "its end is missing";
+    EXPECT_TRUE(kept.has(2, What::places));
+    EXPECT_FALSE(kept.has(2, What::all)) << "it has normals";
+    EXPECT_FALSE(kept.has(3, What::all)) << "nobody asked for that";
+    kept.releasePlaces();
+    EXPECT_TRUE(kept.has(0, What::all));
+    for (const size_t part : {1, 2, 3}) EXPECT_FALSE(kept.has(part, What::places));
+    const PointReader read = kept.read(0, What::all);
+    PointBlock again;
+    EXPECT_EQ(*read(again, 1), 1u);
+    EXPECT_EQ(again.lattice, (std::vector<glm::ivec3>{{1, 2, 3}}));
+    again.clear();
+    EXPECT_EQ(*read(again, 5), 1u);
+    EXPECT_EQ(again.lattice, (std::vector<glm::ivec3>{{-4, 5, 6}}));
+    EXPECT_EQ(again.colour16, (std::vector<uint64_t>{0xffff'0000'0102}));
+    EXPECT_EQ(again.attributes, (std::vector<std::vector<uint8_t>>{{9, 10}}));
+    EXPECT_EQ(*read(again, 5), 0u);
+    kept.release(0);
+    kept.release(0);
+    EXPECT_FALSE(kept.has(0, What::places));
+}
+
 TEST(KeptPoints, OfWhatIsDamagedAreAsManyAsOthersGet) {
     const test::TempFolder folder;
     writeScan(folder / "a.laz", true);

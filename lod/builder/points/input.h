@@ -34,8 +34,8 @@ class PointInput {
     uint64_t identity() const;
 
     /// Reads everything once: bounds, which parts are corrupt, what the colours mean. Fills `report`. `keepsPoints`: of
-    /// points on a lattice the places stay in memory (12 bytes a point), of compressed ones all that was read (6 for a
-    /// colour, and what attributes take), so that read() need not read and decompress them again.
+    /// points on a lattice the places stay in memory (12 bytes a point), of compressed ones in parts that are not large
+    /// all that was read (6 for a colour, and what attributes take), so that read() need not decompress them again.
     Result<void> survey(BuildReport& report, Executor& executor, Progress& progress, bool keepsPoints = false);
     /// Nobody asks for places alone any more.
     void dropPlaces();

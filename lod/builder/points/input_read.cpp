@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstring>
 
 #include "engine/base/numbers.h"
 #include "engine/base/queue.h"

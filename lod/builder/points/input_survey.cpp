@@ -46,13 +46,14 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
 }
 
 std::unique_ptr<KeptPoints> PointInput::roomToKeep(bool keepsPoints) const {
+    // A part goes as a whole, once its last point is in a bucket: of large ones both were there.
+    const uint64_t large = std::max(uint64_t{1} << 20, declared_ / 8);
     std::vector<KeptPoints::Part> parts;
     for (const Part& part : parts_) {
         const SourceInfo& info = sources_[part.source].info;
-        const bool hasMore = info.hasNormal || info.hasRadius || !info.materials.empty();
-        const auto what = !keepsPoints || !info.isLattice ? KeptPoints::What::nothing
-                          : info.isCompressed && !hasMore ? KeptPoints::What::all
-                                                          : KeptPoints::What::places;
+        const auto what = !keepsPoints || !info.isLattice            ? KeptPoints::What::nothing
+                          : info.isCompressed && part.count <= large ? KeptPoints::What::all
+                                                                     : KeptPoints::What::places;
         parts.push_back({part.count, what, info.hasColour});
     }
     std::vector<size_t> widths;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <numeric>
 #include <utility>
 
 namespace stipple::lod {
@@ -22,16 +23,14 @@ std::vector<uint64_t> columnWidths(const KeptPoints::Part& part, std::span<const
 
 }  // namespace
 
-uint64_t KeptPoints::bytesOf(const Part& part, std::span<const size_t> widths) {
-    uint64_t bytes = 0;
-    for (const uint64_t width : columnWidths(part, widths)) bytes += width;
-    return bytes;
-}
-
 KeptPoints::KeptPoints(std::vector<Part> parts, std::vector<size_t> widths)
     : parts_(std::move(parts)), widths_(std::move(widths)), states_(parts_.size()) {
+    for (State& state : states_) state.hasAttribute.resize(widths_.size());
     std::vector<uint64_t> sizes;
-    for (const Part& part : parts_) sizes.push_back(part.count * bytesOf(part, widths_));
+    for (const Part& part : parts_) {
+        const std::vector<uint64_t> of = columnWidths(part, widths_);
+        sizes.push_back(part.count * std::accumulate(of.begin(), of.end(), uint64_t{0}));
+    }
     region_ = std::make_unique<HugeRegion>(sizes);
 }
 
@@ -56,17 +55,15 @@ void KeptPoints::keep(size_t part, uint64_t at, const PointBlock& block) {
     copy(kPlaces, block.lattice, sizeof(glm::ivec3));
     if (of.what == What::places) return;
     State& state = states_[part];
-    copy(kLowColours, block.colour, sizeof(uint32_t));
-    if (!block.colour16.empty()) {
-        state.isWide = true;
-        for (size_t i = 0; i < count; ++i) {
-            const auto low = static_cast<uint32_t>(block.colour16[i]);
-            const auto high = static_cast<uint16_t>(block.colour16[i] >> 32);
-            std::memcpy(columns[kLowColours] + (at + i) * sizeof(low), &low, sizeof(low));
-            std::memcpy(columns[kHighColours] + (at + i) * sizeof(high), &high, sizeof(high));
-        }
+    state.hasMore = state.hasMore || !block.colour.empty() || !block.normal.empty() || !block.radius.empty() ||
+                    !block.material.empty() || of.hasColour == block.colour16.empty();
+    if (state.hasMore) return;
+    for (size_t i = 0; i < block.colour16.size(); ++i) {
+        const auto low = static_cast<uint32_t>(block.colour16[i]);
+        const auto high = static_cast<uint16_t>(block.colour16[i] >> 32);
+        std::memcpy(columns[kLowColours] + (at + i) * sizeof(low), &low, sizeof(low));
+        std::memcpy(columns[kHighColours] + (at + i) * sizeof(high), &high, sizeof(high));
     }
-    state.hasAttribute.resize(widths_.size());
     for (size_t k = 0; k < std::min(widths_.size(), block.attributes.size()); ++k) {
         state.hasAttribute[k] = !block.attributes[k].empty();
         copy(kAttributes + k, block.attributes[k], widths_[k]);
@@ -85,16 +82,13 @@ PointReader KeptPoints::read(size_t part, What what) const {
         };
         copy(kPlaces, block.lattice, sizeof(glm::ivec3));
         if (what == What::all) {
-            if (of.hasColour && !state.isWide) copy(kLowColours, block.colour, sizeof(uint32_t));
-            if (of.hasColour && state.isWide) {
-                block.colour16.resize(count);
-                for (size_t i = 0; i < count; ++i) {
-                    uint32_t low = 0;
-                    uint16_t high = 0;
-                    std::memcpy(&low, columns[kLowColours] + (at + i) * sizeof(low), sizeof(low));
-                    std::memcpy(&high, columns[kHighColours] + (at + i) * sizeof(high), sizeof(high));
-                    block.colour16[i] = low | uint64_t{high} << 32;
-                }
+            block.colour16.resize(of.hasColour ? count : 0);
+            for (size_t i = 0; i < block.colour16.size(); ++i) {
+                uint32_t low = 0;
+                uint16_t high = 0;
+                std::memcpy(&low, columns[kLowColours] + (at + i) * sizeof(low), sizeof(low));
+                std::memcpy(&high, columns[kHighColours] + (at + i) * sizeof(high), sizeof(high));
+                block.colour16[i] = low | uint64_t{high} << 32;
             }
             block.attributes.resize(widths_.size());
             for (size_t k = 0; k < widths_.size(); ++k)
@@ -114,7 +108,7 @@ void KeptPoints::release(size_t part) {
 
 void KeptPoints::releasePlaces() {
     for (size_t i = 0; i < parts_.size(); ++i)
-        if (parts_[i].what != What::all) release(i);
+        if (!has(i, What::all)) release(i);
 }
 
 }  // namespace stipple::lod
