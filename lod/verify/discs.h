@@ -42,8 +42,8 @@ inline void addDiscs(const Hierarchy& h, const Node& node, const Chunk& chunk, s
 }
 
 /// Of a chunk that was read as it is drawn.
-inline size_t overviewOf(const Hierarchy& h, const Node& node, const Chunk& chunk) {
-    return std::min<size_t>(h.overviewOf(node), chunk.records.size());
+inline size_t overviewOf(const Hierarchy& h, const Payload& payload, const Chunk& chunk) {
+    return std::min<size_t>(h.overviewOf(payload), chunk.records.size());
 }
 
 /// Distance of a place from a disc. One without a normal turns with the view: only its centre is there in all of them,

@@ -10,6 +10,7 @@
 #include "lod/primitives/triangle.h"
 #include "lod/store/mesh_place.h"
 #include "lod/verify/discs.h"
+#include "lod/verify/fault.h"
 
 namespace stipple::lod {
 namespace {
@@ -42,11 +43,6 @@ double distanceOf(const Disc& record, const Disc& leaf) {
     return std::hypot(std::abs(height) + rise, sideways);
 }
 
-tl::unexpected<Error> wrong(const Store& store, uint32_t index, std::string what) {
-    return fail(ErrorKind::input, std::move(what), fmt::format("{}: node {}", store.path, index),
-                "this is a fault of the build; build the scene again, and please report it with the input if that does "
-                "not help");
-}
 tl::unexpected<Error> tooFar(const Store& store, uint32_t index, double off, double error) {
     return wrong(store, index,
                  fmt::format("a place of a record's disc is {:.6g} lattice units off the nearest leaf, its error says "
@@ -283,7 +279,7 @@ Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& c
     constexpr size_t kMany = 64, kShare = 4;
     const Hierarchy& h = store.hierarchy;
     const Payload& payload = h.payload(index);
-    const size_t first = overviewOf(h, h.nodes[h.nodeOf(index)], chunk);
+    const size_t first = overviewOf(h, payload, chunk);
     if (chunk.lowBits.empty() || !mayBeCrowded(std::span(chunk.records).subspan(first))) return {};
     using Stored = std::array<uint64_t, 3>;         // within the node's cell
     std::vector<std::pair<Stored, Stored>> places;  // where it is near others, and itself

@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 #include "lod/store/overview_levels.h"
+#include "lod/verify/fault.h"
 
 namespace stipple::lod {
 
@@ -13,7 +12,7 @@ OverviewLevels::OverviewLevels(const Store& store) : store_(store) {
     if (h.nodes.empty() || h.overviewOf(h.nodes[0]) == 0) return;
     const Result<Chunk> chunk = readDrawnChunk(store, 0, true);
     if (!chunk) return;
-    const auto overview = std::span(chunk->records).first(lod::overviewOf(h, h.nodes[0], *chunk));
+    const auto overview = std::span(chunk->records).first(overviewOf(h, h.nodes[0], *chunk));
     forEachOverviewLevel(overview, [&](size_t begin, size_t end) {
         addDiscs(h, h.nodes[0], *chunk, begin, end, 1, levels_.emplace_back());
     });
@@ -23,7 +22,7 @@ Result<uint64_t> OverviewLevels::measure(uint32_t leaf, const Chunk& chunk, uint
     if (levels_.empty()) return 0;
     const Hierarchy& h = store_.hierarchy;
     const Node& node = h.nodes[leaf];
-    const size_t first = leaf == 0 ? lod::overviewOf(h, node, chunk) : 0;
+    const size_t first = leaf == 0 ? overviewOf(h, node, chunk) : 0;
     std::vector<Disc> discs;
     addDiscs(h, node, chunk, first, chunk.records.size(), 1, discs);
     const size_t stride = discs.size() / std::max<uint64_t>(most, 1) + 1;
@@ -46,13 +45,10 @@ Result<uint64_t> OverviewLevels::measure(uint32_t leaf, const Chunk& chunk, uint
                 return least;
             });
             if (off > enough)
-                return fail(ErrorKind::input,
-                            fmt::format("a place of a leaf's disc is {:.6g} lattice units off the overview's level of "
-                                        "{} records, whose error says {:.6g}",
-                                        off, level.size(), error),
-                            fmt::format("{}: node {}", store_.path, leaf),
-                            "this is a fault of the build; build the scene again, and please report it with the input "
-                            "if that does not help");
+                return wrong(store_, leaf,
+                             fmt::format("a place of a leaf's disc is {:.6g} lattice units off the overview's level of "
+                                         "{} records, whose error says {:.6g}",
+                                         off, level.size(), error));
         }
     return measured;
 }

@@ -46,7 +46,7 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, c
     if (std::string text = kind.check(h, index, chunk); !text.empty())
         return fail(ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, h.nodeOf(index)),
                     "this is a fault of the build; please report it with the input");
-    const auto spaced = std::span(chunk.records).subspan(std::min<size_t>(h.overviewOf(payload), chunk.records.size()));
+    const auto spaced = std::span(chunk.records).subspan(overviewOf(h, payload, chunk));
     if (payload.spacingCode != 0 && spacingCodeUp(recordSpacing(spaced)) != payload.spacingCode)
         return fail(ErrorKind::input,
                     fmt::format("its records lie {:.1f} steps apart, not {:.1f} as its table says",
