@@ -8,6 +8,7 @@
 #include <bit>
 #include <cstring>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include "lod/store/check.h"
@@ -17,10 +18,10 @@
 namespace stipple::lod {
 namespace {
 
-// Level 3 saves 1 % of the bytes and takes twice the time on scans. Chunks of points are 14 KB and have few
-// repetitions: with a table of 512 places for them, where level 1 empties one of 32,768 each time, zstd takes 0.7 of
-// the time (0.1 % more bytes; forests, of curves, 1.7 %).
-constexpr int kZstdLevel = 1, kLog2Places = 9, kShortestMatch = 5;
+constexpr int kZstdLevel = 1;  // 3 saves 1 % of the bytes and takes twice the time on scans
+// Records of points are 14 KB a chunk and have few repetitions: with a table of 512 places for them, where level 1
+// empties one of 32,768 each time, zstd takes 0.7 of the time. (Of curves and meshes it would lose 5 % of the bytes.)
+constexpr int kLog2FewPlaces = 9;
 
 constexpr uint32_t kNotFinite = 0x7f800000u;  // the exponent of infinities and NaN
 
@@ -28,13 +29,12 @@ struct ChunkHead {
     uint32_t recordBytes, lowBitBytes;
 };
 
-std::vector<uint8_t> compress(std::span<const uint8_t> raw) {
+/// `log2Places`: of the table of what comes again; 0: the level's own.
+std::vector<uint8_t> compress(std::span<const uint8_t> raw, int log2Places = 0) {
     thread_local std::vector<uint8_t> room;
     if (room.size() < ZSTD_compressBound(raw.size())) room.resize(ZSTD_compressBound(raw.size()));
     ZSTD_CCtx& context = zstdContext(ZSTD_createCCtx, ZSTD_freeCCtx);
-    for (const auto& [what, value] : {std::pair{ZSTD_c_compressionLevel, kZstdLevel},
-                                      {ZSTD_c_hashLog, kLog2Places},
-                                      {ZSTD_c_minMatch, kShortestMatch}})
+    for (const auto& [what, value] : {std::pair{ZSTD_c_compressionLevel, kZstdLevel}, {ZSTD_c_hashLog, log2Places}})
         written(ZSTD_CCtx_setParameter(&context, what, value));
     const size_t bytes = written(ZSTD_compress2(&context, room.data(), room.size(), raw.data(), raw.size()));
     return {room.begin(), room.begin() + static_cast<ptrdiff_t>(bytes)};
@@ -44,7 +44,8 @@ std::vector<uint8_t> compress(std::span<const uint8_t> raw) {
 template <typename T>
 std::vector<uint8_t> encodeRecords(const std::vector<T>& records) {
     thread_local std::vector<uint8_t> scratch;
-    return compress(encodeVertices(records.data(), records.size(), sizeof(T), scratch));
+    constexpr int kPlaces = std::is_same_v<T, shared::PointRecord> ? kLog2FewPlaces : 0;
+    return compress(encodeVertices(records.data(), records.size(), sizeof(T), scratch), kPlaces);
 }
 
 Result<std::vector<uint8_t>> decompress(const uint8_t* bytes, size_t count, size_t limit, const std::string& where) {
